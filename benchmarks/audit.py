@@ -31,7 +31,7 @@ import engine
 from benchmarks import errors, machine, table, web_page
 from benchmarks.bodies import Pair
 from benchmarks.contenders import NotApplicable, Placed, Prepared, rings_of, t_by_segment
-from benchmarks.contest import LISTENERS, Contender, Contest, Row, field_of, refusing, run_contest
+from benchmarks.contest import LISTENERS, RUNG, Contender, Contest, Row, field_of, refusing, run_contest
 from benchmarks.fields import collision as in_collision
 from benchmarks.fields import containment as in_containment
 from benchmarks.fields import distances as in_distances
@@ -138,9 +138,22 @@ def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
     subject = subject_of(solid)
     peers = MESHES if isinstance(subject, Mesh) else POLYGONS if isinstance(subject, Rings) else ()
     asked = [*field_of("points", subject, peers, 1), *books(methods.of_points, solid)]
-    exact = engine.contains(points, solid)
-    return Contest("yours", "contains", True, points, exact, listing_wrong(errors.same), asked, "your points",
-                   request=partial(in_containment.request, subject, points))  # fmt: skip
+    exact, is_measured = engine.contains(points, solid), isinstance(subject, Mesh | Rings)
+
+    def moved(step: float) -> tuple[np.ndarray, np.ndarray]:
+        extent = max(float(np.ptp(np.stack(in_containment.extent_of(subject)), axis=0).max()), 1e-300)
+        other = in_containment.shifted(points[:RUNG], np.array([extent]), step)
+        return other, engine.contains(other, solid)
+
+    near = in_containment.nearness(points[:RUNG], subject) if is_measured else None
+    about = (
+        "your points"
+        if near is None
+        else f"your points, half of them within {near:.1g} of the model's size of its boundary"
+    )
+    return Contest("yours", "contains", True, points, exact, listing_wrong(errors.same), asked, about,
+                   request=partial(in_containment.request, subject, points),
+                   moved=moved if is_measured else None, near=near)  # fmt: skip
 
 
 def own_points(solid: engine.Solid) -> np.ndarray:
@@ -350,6 +363,7 @@ def main(words: Sequence[str] | None = None) -> int:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # what a peer says of its arithmetic
         rows = run_contest(replace(contest, contenders=remaining), 3, given.seconds, has_latency=True)
+    print(f"{contest.about}, judged by exact arithmetic")
     print("\n".join(lines_of(rows)))
     result = facts | {"load_after": machine.load(), "seconds": given.seconds, "quick": False}
     result["rows"] = [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]

@@ -97,13 +97,21 @@ class _Body:
 def collides(pair: Any, row: int) -> bool:
     """Return whether the two bodies of a pair, closed sets, have a common point at one pose."""
     pose = {"rotation": pair.rotations[row].tolist(), "translation": pair.translations[row].tolist()}
-    a, b = _Body(pair.first, None), _Body(pair.second, pose)
+    return _bodies_meet(_Body(pair.first, None), _Body(pair.second, pose), pair.is_closed)
+
+
+def meet(couples: Any) -> np.ndarray:
+    """Return whether two closed meshes without poses have a common point, for each pair."""
+    return np.array([_bodies_meet(*(_Body(body.shape, None) for body in couple), True) for couple in couples])
+
+
+def _bodies_meet(a: _Body, b: _Body, is_closed: bool) -> bool:
     near = np.flatnonzero(((a.low <= b.high.max(axis=0)) & (a.high >= b.low.min(axis=0))).all(axis=1))
     for face in near.tolist():
         for other in np.flatnonzero(((b.low <= a.high[face]) & (b.high >= a.low[face])).all(axis=1)).tolist():
             if triangles_meet(a.face(face), b.face(other)):
                 return True
-    return pair.is_closed and (a.holds_part_of(b) or b.holds_part_of(a))
+    return is_closed and (a.holds_part_of(b) or b.holds_part_of(a))
 
 
 def _passes(segment: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -167,11 +175,6 @@ def relations(left: np.ndarray, right: np.ndarray, pairs: np.ndarray) -> np.ndar
     """Return the relation of each pair of rings of two layers, as numbers of `engine.Relation`."""
     shapes = [[document(Rings("", [ring])) for ring in layer] for layer in (left, right)]
     return np.array([int(relation(shapes[0][a], shapes[1][b])) for a, b in pairs.tolist()])
-
-
-def meet(couples: Any) -> np.ndarray:
-    """Return whether two bodies without poses have a common point, for each pair."""
-    return np.array([int(relation(*(document(body.shape) for body in couple))) != 0 for couple in couples])
 
 
 def exact_distances(couples: Any) -> np.ndarray:

@@ -85,7 +85,8 @@ def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUE
         names = {"title": title, "id": title.lower().translate({ord(c): "-" for c in " ,?"}).strip("-")}
         keyed = {side: key if part else None for side, key, part in zip(("easy", "hard"), keys, parts)}
         near = next((row["near"] for row in parts[1] if row.get("near") is not None), None)
-        made = {"sides": sides, "seen": seen, "is_alone": is_alone, "say": _said(*parts), "near": near}
+        say = _said(*parts) if titles is QUESTIONS else _said(*parts).replace("Hard input", "Your input")
+        made = {"sides": sides, "seen": seen, "is_alone": is_alone, "say": say, "near": near}
         result.append(names | keyed | made)
     return result
 
@@ -221,7 +222,14 @@ def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:
     facts = [(f"{len(wrong)} of {len(others)}", "bad" if wrong else "good", words, "contenders differ")]
     if wrong:
         worst = wrong[-1]["contender"]
-        facts.append((percent(error_share(wrong[-1])), "bad", f"of its answers: {worst}, the worst", f"worst: {worst}"))
+        facts.append(
+            (
+                percent(error_share(wrong[-1])),
+                "bad",
+                f"of the answers of {worst} are wrong, the worst",
+                f"worst: {worst}",
+            )
+        )
     return facts
 
 
@@ -251,6 +259,7 @@ def text_of(result: dict[str, Any], path: str, titles: Sequence[tuple[str, str, 
         "versus": f"{OURS} beside the fastest peer" if titles is QUESTIONS else "Your data",
         "winners": winners(rows) if titles is QUESTIONS else [],
         "museum": titles is QUESTIONS,
+        "own": "" if titles is QUESTIONS else titles[0][0],
         "costs": costs(result) if titles is QUESTIONS else [],
         "questions": queried,
         "contests": contests,

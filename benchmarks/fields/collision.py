@@ -145,7 +145,7 @@ def _bricks(size: Size, is_hard: bool) -> Contest:
 
 def _neighbours(size: Size, is_hard: bool) -> Contest:
     """Parcels and their neighbours, or the halves of these, whose new corners are rounded: which relation?"""
-    left, right = parcels_and_parts(size.n(400, 100), size.seed, is_hard)
+    left, right = parcels_and_parts(size.n(225, 100), size.seed, is_hard)
     pairs = errors.boxes_that_meet(left, right)
     result = field_of("relations of polygons", (left, right), ("shapely",), 1)
 

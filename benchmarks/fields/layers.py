@@ -40,7 +40,7 @@ def _overlay(size: Size) -> Contest:
 
 def _join(size: Size, is_hard: bool) -> Contest:
     """Which parcel touches which? Hard: parcels of the second layer are halves, their cuts rounded onto the sides."""
-    left, right = polygon_pairs.parcels_and_parts(size.n(400, 100), size.seed, is_hard)
+    left, right = polygon_pairs.parcels_and_parts(size.n(225, 100), size.seed, is_hard)
     pairs = errors.boxes_that_meet(left, right)
     exact = errors.relations(left, right, pairs) == 4
     made = [replace(each, make=partial(_among, each, pairs, len(right)))
