@@ -51,6 +51,14 @@ def test_a_question_is_said_in_words() -> None:
     assert "EXACT-GEOMETRY IS WRONG in 3 of 200" in web_page.questions(wrong)[0]["say"]
 
 
+def test_what_stands_beside_speed_is_said_with_the_best_first() -> None:
+    figures = [{"name": "memory", "unit": "MB", "note": "how", "raw": {"rows": {"a": 20.0, "b": 3.25}}},
+               {"name": "16 cores", "unit": "x", "note": "", "raw": {"rows": {"a": 2.0, "b": 9.0}}},
+               {"name": "no contest", "unit": "s", "note": "", "raw": {}}]  # fmt: skip
+    expected = [("memory", "b 3.2 MB; a 20 MB", "how"), ("16 cores", "b 9 x; a 2 x", "")]
+    assert web_page.costs({"figures": figures}) == expected
+
+
 def test_the_first_words_count_ours_then_who_is_faster() -> None:
     ours, easy, hard = web_page.summary(web_page.questions(ROWS), ROWS)
     assert ours[:2] == ("0 of 400", "good")
