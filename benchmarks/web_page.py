@@ -13,6 +13,8 @@ from benchmarks.measure import interval
 PAGES = Path(__file__).with_name("pages")
 QUESTIONS: list[tuple[str, str, str, str]] = json.loads((PAGES / "questions.json").read_text("utf-8"))
 """Title, operation, its easy and its hard contest."""
+N_FIRST = next(number for number, (title, *_) in enumerate(QUESTIONS) if title == "Bricks that touch")
+"""Questions of the first list; contact, hits, cuts and layers are a list of their own."""
 FACTS = ("commit", "processor", "cores", "seed", "load_before", "load_after", "seconds", "versions", "quick")
 BAD = ("wrong", "refused", "outside")
 SAME = 1.1
@@ -74,7 +76,7 @@ def times(ratio: float) -> str:
 def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> list[dict[str, Any]]:
     """Return the questions that there are rows of: who is faster by how much, who is wrong, and both in a sentence."""
     result = []
-    for title, operation, easy, hard in titles:
+    for number, (title, operation, easy, hard) in enumerate(titles):
         keys = [f"{operation}, {name}" for name in (easy, hard)]
         parts = [[row for row in rows if key_of(row) == key] for key in keys]
         if not any(parts):
@@ -87,6 +89,7 @@ def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUE
         near = next((row["near"] for row in parts[1] if row.get("near") is not None), None)
         say = _said(*parts) if titles is QUESTIONS else _said(*parts).replace("Hard input", "Your input")
         made = {"sides": sides, "seen": seen, "is_alone": is_alone, "say": say, "near": near}
+        made["is_more"] = number >= N_FIRST
         result.append(names | keyed | made)
     return result
 
@@ -192,14 +195,17 @@ def summary(queried: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, s
 
 
 def winners(rows: list[Row]) -> list[str]:
-    """Return where a peer is faster and never wrong, with how much faster, the largest first."""
+    """Return the questions at which a peer is faster and never wrong, on easy or hard input, the largest first."""
     found = []
-    for key in dict.fromkeys(key_of(row) for row in rows):
-        mine = [row for row in rows if key_of(row) == key]
-        ours, right = _ours(mine), [row for row in _peers(mine) if not failing(row)]
-        if ours and right and tone(ours["rate"] / right[0]["rate"]) == "slower":
-            found.append((right[0]["rate"] / ours["rate"], f"{key}: {short(right[0])}"))
-    return [f"{name} {number(ratio)}x" for ratio, name in sorted(found, reverse=True)]
+    for title, operation, *names in QUESTIONS:
+        best: list[tuple[float, str]] = []
+        for how, name in zip(("easy", "hard"), names):
+            mine = [row for row in rows if key_of(row) == f"{operation}, {name}"]
+            ours, right = _ours(mine), [row for row in _peers(mine) if not failing(row)]
+            if ours and right and tone(ours["rate"] / right[0]["rate"]) == "slower":
+                best.append((right[0]["rate"] / ours["rate"], f"{short(right[0])}, {how}"))
+        found += [(*max(best), title)] if best else []
+    return [f"{title} {number(ratio)}x ({peer})" for ratio, peer, title in sorted(found, reverse=True)]
 
 
 def costs(result: dict[str, Any]) -> list[tuple[str, str, str]]:

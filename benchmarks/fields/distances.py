@@ -68,7 +68,8 @@ def _hard(size: Size, name: str, gap: float) -> Contest:
         other = beside(mesh, step, len(points), generator(f"distances {step}", size.seed))
         return other, _exact(other, mesh)
 
-    about = f"{len(mesh.faces)} faces, points off them by {gap:g} of the radius before rounding"
+    about = f"{len(mesh.faces)} faces, points off them by {gap:g} of the radius before rounding; a distance is wrong "
+    about += "when it is off by more than a millionth of itself"
     exact = _exact(points, mesh)
     return Contest("distances", name, True, points, exact, distances,
                    field_of("point distances", mesh, tuple(PEERS), 1), about, request=partial(asked, mesh, points),

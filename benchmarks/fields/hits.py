@@ -63,7 +63,8 @@ def _hard(size: Size, name: str, place: str) -> Contest:
         segments = np.stack([0.75 * a + 0.25 * b, 0.25 * a + 0.75 * b], axis=1)
         outward = np.broadcast_to(segments.mean(axis=1, keepdims=True), segments.shape)
         sides = draw.choice([-1.0, 1.0], (n, 1, 1))
-        about = f"{len(mesh.faces)} faces, each segment between two points of an edge: does it meet the surface?"
+        about = f"{len(mesh.faces)} faces, each segment between two points of an edge: does it meet the surface? "
+        about += "Rays of the peers leave out triangles seen edge-on"
         return _contest(name, place, mesh, segments, n, about, True, outward * sides)
     targets = np.where(draw.integers(0, 2, (n, 1)) == 0, a, 0.5 * (a + b))
     starts = np.round(draw.uniform(-3.0, 3.0, (n, 3)) * LATTICE) / LATTICE

@@ -123,7 +123,7 @@ def test_in_a_browser(browser: Any, tmp_path: Path, width: int, scheme: str) -> 
 
 
 def test_a_phone_shows_on_its_first_screen_what_costs_what_and_who_is_wrong(browser: Any) -> None:
-    """Of 390 x 844 a browser leaves 664: every question that has a peer, its speed and the share of a peer's errors."""
+    """Of 390 x 844 a browser leaves 664: the first list of questions, their speed and the share of a peer's errors."""
     page = browser.new_page(viewport={"width": 390, "height": 664}, color_scheme="light")
     page.goto((DOCS / "speed_and_error.html").as_uri())
     buttons = page.locator("#questions ol").first.locator("button").all()
