@@ -20,6 +20,7 @@ BAD = ("wrong", "refused", "outside")
 SAME = 1.1
 """Two speeds are the same within this ratio."""
 OURS = "exact-geometry"
+CPP = "textbook: Sutherland-Hodgman in C++"
 STEPS = ("1e-12", "1e-09", "1e-06")
 """By how much of the model's size hard items are moved, as the results name it."""
 Row = dict[str, Any]
@@ -217,7 +218,16 @@ def costs(result: dict[str, Any]) -> list[tuple[str, str, str]]:
         found = (f"{name} {number(value)} {unit}" for name, value in sorted(rows.items(), key=lambda row: way * row[1]))
         if "rows" in figure["raw"]:
             said.append((figure["name"], "; ".join(found), figure["note"]))
+    beside = [_beside_cpp(row, result["rows"]) for row in result["rows"] if row["contender"] == CPP and row["rate"]]
+    if beside:
+        how = "float64, a page of code, compiled here; exact-geometry decides exactly and rounds each coordinate once"
+        said.append(("Sutherland-Hodgman in C++", "; ".join(beside), how))
     return said
+
+
+def _beside_cpp(cpp: Row, rows: list[Row]) -> str:
+    ours = next(row for row in rows if row["contender"] == "ours" and key_of(row) == key_of(cpp))
+    return f"{cpp['contest']}: {number(cpp['rate'] / ours['rate'])}x as fast, {percent(error_share(cpp))} wrong"
 
 
 def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:

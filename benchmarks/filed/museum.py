@@ -34,7 +34,7 @@ def text_of(rows: list[dict[str, Any]], cases: list[Case], path: str) -> str:
             one = [row["contender"], "another rule" if is_rule else row["outcome"], row["note"], where]
             answered.setdefault(row["case"], []).append(one)
     shown = [
-        {key: case[key] for key in ("id", "thread", "about")}
+        {key: case[key] for key in ("id", "thread", "about")} | {"made": case.get("made", False)}
         | {"exact": exact_words(case), "request": request(case), "today": answered[case["id"]]}
         for case in cases if case["id"] in answered
     ]  # fmt: skip
@@ -130,7 +130,7 @@ def said(case: Case, answer: Any) -> tuple[str, list[int]]:
         case "overlay" | "clip_polygons":
             return f"area {float(sum(answer) if case['operation'] == 'clip_polygons' else answer)!r}", []
         case "hits":
-            return f"{plural(len(places(answer)), 'place')} hit", wrong_lines(case, answer)
+            return said_of_lines(case, answer)
         case "distances" | "section":
             return numbers(answer), far_off(case, answer) if case["operation"] == "distances" else []
         case "volume" | "cut" | "overlap":
@@ -147,6 +147,15 @@ def wrong_lines(case: Case, answer: Any) -> list[int]:
         if len(both[0]) != len(both[1]) or any(abs(a - b) > CLOSE for a, b in zip(*both)):
             wrong.append(number)
     return wrong
+
+
+def said_of_lines(case: Case, answer: Any) -> tuple[str, list[int]]:
+    """Return how often the first segment that is hit elsewhere than exactly is hit, and all such segments."""
+    wrong = wrong_lines(case, answer)
+    n_exact = sum(hit["segment"] == wrong[0] for hit in case["answer"])
+    found = plural(sum(segment == wrong[0] for segment, _ in places(answer)), "place")
+    which = f" of line {wrong[0] + 1}" if len(case["input"]["segments"]) > 1 else ""
+    return f"{found}{which} hit, exactly {n_exact}", wrong
 
 
 def numbers(values: Any) -> str:

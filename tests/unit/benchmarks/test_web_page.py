@@ -56,7 +56,9 @@ def test_what_stands_beside_speed_is_said_with_the_best_first() -> None:
                {"name": "16 cores", "unit": "x", "note": "", "raw": {"rows": {"a": 2.0, "b": 9.0}}},
                {"name": "no contest", "unit": "s", "note": "", "raw": {}}]  # fmt: skip
     expected = [("memory", "b 3.2 MB; a 20 MB", "how"), ("16 cores", "b 9 x; a 2 x", "")]
-    assert web_page.costs({"figures": figures}) == expected
+    assert web_page.costs({"figures": figures, "rows": []}) == expected
+    rows = [row("uniform", name, rate, wrong) for name, rate, wrong in (("ours", 2.0, 0), (web_page.CPP, 9.0, 2))]
+    assert web_page.costs({"rows": rows})[0][1] == "uniform: 4.5x as fast, 1% wrong"
 
 
 def test_the_first_words_count_ours_then_who_is_faster() -> None:
