@@ -648,7 +648,7 @@ def test_it_turns_until_it_is_taken_in_hand_and_not_for_those_who_want_less_moti
 def test_axe_finds_no_violation(page: Any, scheme: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
     page.emulate_media(color_scheme=scheme)
-    for question, dimension in (("proof", 3), ("overlay", 2)):
+    for question, dimension in (("proof", 3), ("overlay", 2), ("cut", 3), ("hits", 3), ("scene", 2)):
         choose(page, question, dimension)
         found = axe.Axe().run(page).response["violations"]
         assert [(rule["id"], [node["html"] for node in rule["nodes"]]) for rule in found] == []
