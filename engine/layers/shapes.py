@@ -112,12 +112,11 @@ def shapes_of(layer: MixedLayer, limits: Limits) -> tuple[Shapes, IntArray]:
     following[tails[is_open]] = tails[is_open]
     following -= np.repeat(firsts[:-1], np.diff(firsts))
     ends, end_firsts = _ends(vertices, offsets, owners, dims, n)
-    filled = np.flatnonzero(dims == LINE)  # case: all vertices of a line are one point: a point, as GEOS has it
-    if len(filled):
-        low, high = (each.reduceat(vertices, firsts[filled]) for each in (np.minimum, np.maximum))
-        dims = dims.copy()
-        dims[filled[(low == high).all(axis=1)]] = POINT
     sizes = np.diff(firsts)
+    if (dims == LINE).any():  # case: all vertices of a line are one point: a point, as GEOS has it
+        is_moving = (vertices != vertices[np.repeat(firsts[:-1], sizes)]).any(axis=1)
+        n_moving = np.bincount(np.repeat(np.arange(n), sizes)[is_moving], minlength=n)
+        dims = np.where((dims == LINE) & (n_moving == 0), POINT, dims).astype(np.int8)
     leaves = 1 << np.ceil(np.log2(np.maximum(1, -(-sizes // BLOCK)))).astype(np.int64)
     box_firsts = summed(2 * leaves - 1)  # the row before a root, which no tree uses, is the last of the feature before
     limits.budget().take(8 * (4 * int(box_firsts[-1]) + 3 * len(vertices)))

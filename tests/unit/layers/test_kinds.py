@@ -120,6 +120,13 @@ def square_of_distance(one: Any, other: Any) -> Fraction:
     return min(square(p, a, b) for mine, theirs in pairs for each in mine for p in each for a, b in theirs)
 
 
+@pytest.mark.parametrize("after", ["POLYGON ((0 0, 1 0, 1 1, 0 0))", "POINT (9 9)", "MULTILINESTRING EMPTY"])
+def test_a_line_of_one_point_is_a_point_whatever_follows_it(after: str) -> None:
+    points = geopandas.GeoDataFrame(geometry=shapely.from_wkt(["LINESTRING (2 2, 2 2)", after]))
+    square = geopandas.GeoDataFrame(geometry=[shapely.box(0, 0, 4, 4)])
+    assert 0 in layers.sjoin(points, square, predicate="within").index
+
+
 def test_all_nearest_features_are_there() -> None:
     left, right = (frame(15, 3, name, apart=12.0) for name in "ab")
     found = layers.sjoin_nearest(left, right, distance_col="far")
