@@ -17,6 +17,7 @@ from collections.abc import AsyncIterator
 from functools import partial
 from typing import Any, Final
 
+import numpy as np
 import orjson
 from fastapi.routing import APIRoute, APIRouter
 from starlette.requests import ClientDisconnect, Request
@@ -258,10 +259,10 @@ def _layer_of(given: Any, call: Call) -> Any:
         bodies, poses = [*scene.solids], [*scene.poses]
     if any(poses) or not all(isinstance(body, engine.Polygon) for body in bodies):
         raise ServiceError("unsupported_solid", "a layer is of polygons without poses; store these as a solid or scene")
-    unions = (engine.union_all([body], deadline=call.remaining(), cancel=call) for body in bodies)
+    rings = (np.split(body.vertices, body.ring_offsets[1:-1]) for body in bodies)  # a union would round crossings
     features = [
-        {"type": "Feature", "id": number, "properties": {}, "geometry": union.__geo_interface__}
-        for number, union in enumerate(unions)
+        {"type": "Feature", "id": number, "geometry": {"type": "Polygon", "coordinates": given}}
+        for number, given in enumerate(rings)
     ]
     return {"type": "FeatureCollection", "features": features}
 

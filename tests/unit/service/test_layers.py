@@ -283,6 +283,24 @@ async def test_a_stored_layer_serves_streams(client: httpx.AsyncClient) -> None:
         check_problem(await ask(given), status, code)
 
 
+@pytest.mark.parametrize("rings", [[[[0, 0], [8, 4], [8, 0], [0, 3]]], [[[0, 0], [8, 0], [4, 0]]],
+                                   [[[0, 0], [2, 0], [2, 2]], [[5, 0], [9, 0], [9, 4]]]])  # fmt: skip
+async def test_a_stored_layer_has_the_boundary_of_its_polygon(client: httpx.AsyncClient, rings: Any) -> None:
+    name = (await client.post("/v1/solids", json={"type": "polygon", "rings": rings})).json()["id"]
+    first = {"operation": "contains", "layer": {"type": "stored", "id": name}}
+    points = [[x / 2, y / 2] for x in range(19) for y in range(9)]
+    features = [{"type": "Feature", "geometry": {"type": "Point", "coordinates": at}} for at in points]
+    answer = await client.post(
+        "/v1/layers/stream", content="\n".join(map(json.dumps, [first, *features])).encode(),
+        headers={"content-type": "application/x-ndjson"},
+    )  # fmt: skip
+    rows = [json.loads(line) for line in answer.text.splitlines()]
+    expected = enumerate(engine.locate(points, engine.Polygon(rings)).tolist())
+    assert [(row["point"]["index"], int(not row["boundary"])) for row in rows] == [
+        each for each in expected if each[1] >= 0
+    ]
+
+
 async def test_lines_of_a_stream_are_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "warm", lambda **_: None)
     first = json.dumps({"operation": "clip", "layer": collection([frozenset({(0, 0)})])})
