@@ -257,9 +257,10 @@ def _layer_of(given: Any, call: Call) -> Any:
     except ServiceError:
         scene = call.store.get_scene(name)
         bodies, poses = [*scene.solids], [*scene.poses]
-    if any(poses) or not all(isinstance(body, engine.Polygon) for body in bodies):
+    polygons = [body for body in bodies if isinstance(body, engine.Polygon)]
+    if any(poses) or len(polygons) < len(bodies):
         raise ServiceError("unsupported_solid", "a layer is of polygons without poses; store these as a solid or scene")
-    rings = (np.split(body.vertices, body.ring_offsets[1:-1]) for body in bodies)  # a union would round crossings
+    rings = (np.split(each.vertices, each.ring_offsets[1:-1]) for each in polygons)  # a union would round crossings
     features = [
         {"type": "Feature", "id": number, "geometry": {"type": "Polygon", "coordinates": given}}
         for number, given in enumerate(rings)
