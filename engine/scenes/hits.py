@@ -152,6 +152,7 @@ def _near(lines: Lines, scene: Placements, budget: Budget) -> Iterator[tuple[Int
         near[:, 1] = scene.names_of(near[:, 1])
         order = np.argsort(near[:, 1], kind="stable")
         yield near, np.split(order, np.flatnonzero(np.diff(near[order, 1])) + 1) if len(near) else []
+        budget.take(-_BYTES_OF_PAIR * room)
 
 
 def _lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:

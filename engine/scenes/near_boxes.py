@@ -97,7 +97,7 @@ NUMBERS: address of (4,), inverse and origin. NAMES: of (n,), indices of moved b
 `Table`."""
 _MOST_WAY: Final = 2.0**1000
 _FAR: Final = 2.0**38
-"""Size in tree coordinates from which a line is said to be near every body."""
+"""Size in tree coordinates from which a line is compared with the box of each body."""
 _SLACK: Final = 2.0**-20
 """Enlargement of a box in tree coordinates (at most 2 where it matters) that covers its rounding to float32."""
 
@@ -168,10 +168,13 @@ def way_of_line(lines: FloatArray, item: int, is_ray: bool, bodies: BodyTree) ->
     way = Point3(q.x * x, q.y * x, q.z * x)
     if not is_ray:
         way = Point3(way.x - p.x * x, way.y - p.y * x, way.z - p.z * x)
-    size, length = max(abs(start.x), abs(start.y), abs(start.z)), max(abs(way.x), abs(way.y), abs(way.z))
-    reach = (size + 4.0 * LIMIT) / length if is_ray and length > 0.0 else 1.0
+    size, length = abs(start.x) + abs(start.y) + abs(start.z), max(abs(way.x), abs(way.y), abs(way.z))
+    is_small, reach = size < _FAR, 1.0
+    if is_ray:  # case: the direction is beyond doubles, or below them, in these coordinates
+        reach = (size + 4.0 * LIMIT) / length if length > 0.0 else np.inf
+        is_small &= length < np.inf and reach < np.inf
     far = Point3(start.x + reach * way.x, start.y + reach * way.y, start.z + reach * way.z)
-    is_small = size < _FAR and reach < np.inf and max(abs(far.x), abs(far.y), abs(far.z)) < 2.0 * _FAR
+    is_small &= max(abs(far.x), abs(far.y), abs(far.z)) < 2.0 * _FAR
     return local_segment(start, far, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.0), is_small
 
 
@@ -249,13 +252,12 @@ def near_pairs(
             bodies, n_before = tree_in(words[side], 3), side * words[0, N_BODIES]
             way, is_small = way_of_line(lines, item, is_ray, bodies)
             begin_way(bodies, way, scratch)
-            turn = 0
-            while True:  # bound: each body once
+            for turn in range(words[side, N_BODIES]):  # bound: each body once
                 body = next_body(lines, item, is_ray, bodies, way, np.float32(1.0), scratch) if is_small else turn
-                turn += 1
-                if body < 0 or turn > words[side, N_BODIES]:
+                if body < 0:
                     break
-                if side == 1 or not has_moved(words, body):
+                is_near = is_small or _in_its_box(lines, item, is_ray, bodies, body)
+                if is_near and (side == 1 or not has_moved(words, body)):
                     pairs[n[1], 0], pairs[n[1], 1] = item, n_before + body
                     n[1] += 1
     n[0] = lines.shape[0]

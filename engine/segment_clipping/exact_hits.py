@@ -7,17 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine.predicates.rational import Number, common_integers, cross, dot, minus, nearest_with_root
 from engine.segment_clipping.exact_pieces import LAST, Contact, contacts_of
 from engine.segment_clipping.hit_search import ACROSS, ALONG, END, RIM, TOUCH
-from engine.segment_clipping.profiles import _near
+from engine.segment_clipping.profiles import LARGEST, _near
 from engine.types import FlagArray, FloatArray
-
-_LARGEST: Final = float(np.finfo(np.float64).max)
 
 
 class ExactHit(NamedTuple):
@@ -119,7 +117,7 @@ def near_elements(elements: FloatArray, p: Sequence[Number], way: Sequence[Numbe
         return _near(elements, p, [Fraction(x) + Fraction(d) for x, d in zip(p, way)])
     apart = np.zeros(len(elements), np.bool_)
     for k, (x, d) in enumerate(zip(p, way)):
-        at = float(max(min(x, _LARGEST), -_LARGEST))
+        at = float(max(min(x, LARGEST), -LARGEST))
         if d >= 0:
             apart |= elements[:, :, k].max(axis=1) < np.nextafter(at, -np.inf)
         if d <= 0:

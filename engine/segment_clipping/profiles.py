@@ -54,6 +54,7 @@ from engine.types import FloatArray, IntArray
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 _BYTES: Final = 1000
 """Memory counted for a piece as a Python object."""
+LARGEST: Final = float(np.finfo(np.float64).max)
 Point = Sequence[Number]
 
 
@@ -366,8 +367,8 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
 def _near(elements: FloatArray, p: Point, q: Point) -> Any:
     """Return the indices of the elements (k, corners, dim) whose boxes a segment p q of rationals may meet; its box is
     rounded outward."""
-    with np.errstate(all="ignore"):  # what is no number keeps an element
-        a, b = (np.array([float(x) for x in point]) for point in (p, q))
+    with np.errstate(all="ignore"):  # what is no number, as beyond doubles, keeps an element
+        a, b = (np.array([float(x) if -LARGEST <= x <= LARGEST else np.inf for x in point]) for point in (p, q))
         low, high = elements.min(axis=1), elements.max(axis=1)
         size = max(np.abs(a).max(), np.abs(b).max(), np.abs(low).max(), np.abs(high).max())
         slack = 2.0**-40 * size + 2.0**-500

@@ -231,3 +231,76 @@ def test_a_segment_longer_than_the_largest_double_hits_bodies_of_scenes() -> Non
     assert engine.hits(segment, surface).t.tolist() == [0.5]
     assert engine.Scene([surface]).hits(segment).t.tolist() == [0.5]
     assert engine.Scene([surface]).hits(segment, keep="any").tolist() == [True]
+
+
+def exact_rows(lines: Any, images: list[Any], is_ray: bool) -> list[Any]:
+    """Return (source, body, t) of the hits of lines on bodies of one triangle each, t as a fraction."""
+    rows = []
+    for source, (p, q) in enumerate(lines):
+        way = vector(q) if is_ray else sub(vector(q), vector(p))
+        found = [(hit.t, body) for body, image in enumerate(images)
+                 for hit in reference.hits(vector(p), way, is_ray, image, [0])]  # fmt: skip
+        rows += [(source, body, t) for t, body in sorted(found)]
+    return rows
+
+
+TRIANGLE = np.array([[0, -1, -1], [0, 1, -1], [0, 0, 2]])
+
+
+@pytest.mark.parametrize("n", [3, 8])
+@pytest.mark.parametrize(
+    ("corners", "step", "ray"),
+    [
+        (1e-11 * TRIANGLE, [1e-10, 1e-10, 0], [[-1e-10, -5e-10, 0], [1e298, 5e298, 0]]),  # one is, times 2^33
+        ([[1.7e308, 3e307, -1e300], [1.7e308, 5e307, -1e300], [1.7e308, 4e307, 1e300]], [-1e307, 0, 0],
+         [[-1.7e308, -1e308, 0], [1e300, 4.1176470588235296e299, 0]]),  # the box is farther away than any double
+    ],
+)  # fmt: skip
+def test_rays_beyond_doubles_in_the_coordinates_of_a_scene(n: int, corners: Any, step: Any, ray: Any) -> None:
+    surfaces = [engine.Surface(np.add(corners, np.multiply(step, k)), [[0, 1, 2]]) for k in range(n)]
+    expected = exact_rows([ray], [images_under(engine.Pose.identity(3), each)[0:1] for each in surfaces], True)
+    found = engine.Scene(surfaces).hits([ray], rays=True)
+    assert expected
+    assert [*zip(found.body.tolist(), found.t.tolist())] == [(body, float(t)) for _, body, t in expected]
+
+
+@pytest.mark.parametrize("n", [3, 8])
+def test_rays_so_slow_that_they_stand_still_in_the_coordinates_of_a_scene(n: int) -> None:
+    scene = engine.Scene([engine.Surface(1e300 * np.add(TRIANGLE, [k, 0, 0]), [[0, 1, 2]]) for k in range(n)])
+    ray = [[[-1e300, 0, 0], [1e-30, 0, 0]]]
+    assert scene.hits(ray, rays=True, keep="any").tolist() == [True]
+    with pytest.raises(engine.NotRepresentableError):
+        scene.hits(ray, rays=True)
+
+
+def test_segments_beyond_doubles_in_the_frame_of_a_body() -> None:
+    """It was an OverflowError."""
+    beside = engine.Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [9e307, 0, 0])
+    corners = np.array([[0, 1.1e308, 0], [1e300, 1.1e308, 0], [0, 1.1e308, 1e300], [0, 1.2e308, 0]])
+    body, line = (
+        engine.Polyhedron(corners, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]]),
+        [[-1e308, 2e299, 2e299], [1e308, 2e299, 2e299]],
+    )
+    images = images_under(beside, body)
+    expected = [float(hit.t) for hit in reference.hits(
+        vector(line[0]), sub(vector(line[1]), vector(line[0])), False, images, [0, 1, 2, 3])]  # fmt: skip
+    scene = engine.Scene([body], [beside])
+    assert len(expected) == 2
+    assert scene.hits([line]).t.tolist() == expected
+    assert scene.clip_segments([line]).t.tolist() == [expected]
+
+
+class Counting(engine.Cancel):
+    """Memory that a call announces."""
+
+    taken = 0
+
+    def take(self, n_bytes: int) -> None:
+        self.taken += n_bytes
+
+
+def test_memory_of_pairs_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("engine.scenes.hits._PAIRS", 1)
+    lines, cancel = np.tile([[[1.0, 2, 9], [1, 2, 8]]], (100, 1, 1)), Counting()
+    assert len(engine.Scene([SHEET, SHEET]).hits(lines, cancel=cancel)) == 0
+    assert cancel.taken == 0
