@@ -89,10 +89,10 @@ def _search(mesh: Mesh, line: Line, keep: int, scratch: _Scratch, stop: FlagArra
     """Fill the cuts of `scratch` with the contacts of a line, or those of its first hit; return their number, NO_ROOM,
     or UNSURE. ANY: 1 if there is one. NEAR: cuts.met is filled with all triangles near."""
     x, y, z = mesh.inverse[0], mesh.inverse[1], mesh.inverse[2]
-    start = Point3(
-        line.start[0][0] * x - mesh.origin[0] * x,
-        line.start[1][0] * y - mesh.origin[1] * y,
-        line.start[2][0] * z - mesh.origin[2] * z,
+    start = Point3(  # order: the tails are added to what the origin leaves, of which they may be no small part
+        line.start[0][0] * x - mesh.origin[0] * x + line.start[0][1] * x,
+        line.start[1][0] * y - mesh.origin[1] * y + line.start[1][1] * y,
+        line.start[2][0] * z - mesh.origin[2] * z + line.start[2][1] * z,
     )
     way = Point3(line.way[0][0] * x, line.way[1][0] * y, line.way[2][0] * z)
     size, length = max(abs(start.x), abs(start.y), abs(start.z)), max(abs(way.x), abs(way.y), abs(way.z))
