@@ -183,11 +183,15 @@ def test_ends_near_a_placed_surface_of_lines_that_begin_far_away() -> None:
 
 def test_small_bodies_whose_own_coordinates_are_large() -> None:
     """Tails of starts were left out of where lines enter the tree: hits were lost."""
-    turned, draw = engine.Pose.from_quaternion([3, 1, 2, -1], [3e9, -7e9, 2e9]), np.random.default_rng(3)
-    surface = engine.Surface(TRIANGLE * 2.0**-9 + [3e12, -2e12, 1e12], [[0, 1, 2]])
+    far, draw = np.array([3e12, -2e12, 1e12]), np.random.default_rng(3)
+    turned = engine.Pose.from_quaternion([3, 1, 2, -1])
+    turned = engine.Pose(turned.rotation, -turned.rotation @ far)
+    surface = engine.Surface(TRIANGLE * 2.0**-9 + far, [[0, 1, 2]])
     images = images_under(turned, surface)
-    middle = np.array([float(sum(corner[k] for corner in images[0]) / 3) for k in range(3)])
-    lines = middle + draw.normal(size=(60, 2, 3)) * [[[2.0**-9], [2.0**-6]]]
+    corners = np.array([[float(x) for x in corner] for corner in images[0]])
+    lines = (draw.dirichlet([1, 1, 1], 60) @ corners)[:, None] + draw.normal(size=(60, 1, 3)) * [
+        [[2.0**-9], [-(2.0**-9)]]
+    ]
     found = engine.Scene([surface], [turned]).hits(lines)
     expected = exact_rows(lines.tolist(), [images], False)
     assert expected
