@@ -171,6 +171,24 @@ def test_of_a_flat_triangle_of_space_and_of_one_under_a_pose() -> None:
           pose=engine.Pose(turn, move))  # fmt: skip
 
 
+@pytest.mark.parametrize(("far", "tolerance"), [(1e12, 1e-12), (3e13, 1e-12), (1.0, 1e-2), (1e9, 1e-6)])
+def test_of_a_small_body_that_a_pose_brings_back_from_afar(far: float, tolerance: float) -> None:
+    """The search looks in the body's own coordinates, where the point is known worse than the body is large, or lengths
+    are not those of the pose."""
+    rng = np.random.default_rng(7)
+    for _ in range(4):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn = turn * np.sign(np.linalg.det(turn)) + rng.uniform(-0.2, 0.2, (3, 3)) * tolerance
+        spikes = 0.01 * SPIKES + far * rng.normal(size=3)
+        pose = engine.Pose(turn, -(turn @ spikes[0]) + 0.01 * rng.normal(size=3), tolerance=tolerance)
+        rows, move = [exact(row) for row in pose.rotation], exact(pose.translation)
+        image = [tuple(dot(row, exact(p)) + x for row, x in zip(rows, move)) for p in spikes]
+        middle = np.array([[float(x) for x in p] for p in image]).mean(axis=0)
+        points = middle + rng.normal(size=(6, 3)) * 0.03 * 10.0 ** rng.uniform(-1, 1.5, (6, 1))
+        body = engine.Polyhedron(spikes, SPIKE_FACES)
+        check(points, body, [[image[i] for i in face] for face in SPIKE_FACES], None, pose=pose)
+
+
 @pytest.mark.parametrize("d", [2, 3])
 def test_of_balls_and_half_spaces(d: int) -> None:
     rng = np.random.default_rng(d)
