@@ -113,7 +113,7 @@ def build_bvh(boxes: FloatArray) -> Bvh:
             poll()
             _build_binary_tree(items, halves, stack, state)
         room = int(state[1])  # a bound; what is left untouched takes no memory
-        nodes, child = rows_of((room, 6, WIDTH), np.float32), rows_of((room, WIDTH), np.int32)
+        nodes, child = empty_rows((room, 6, WIDTH), np.float32), empty_rows((room, WIDTH), np.int32)
         stack[0], state[:] = 0, 1
         while state[0] > 0:  # bound: each turn fills a node
             poll()
@@ -152,14 +152,14 @@ def _stretch(boxes: FloatArray, stretch: FloatArray) -> None:
             boxes[item, 3 + axis] *= stretch[axis]
 
 
-def rows_of(shape: tuple[int, ...], dtype: Any) -> Any:
+def empty_rows(shape: tuple[int, ...], dtype: Any) -> Any:
     """Return an uninitialised array, aligned to a cache line unless it has few rows."""
     return aligned(shape, dtype) if shape[0] > _FEW_ROWS else np.empty(shape, dtype)
 
 
 def cache_aligned(array: Any) -> Any:
     """Return a read-only copy of an array, aligned to a cache line unless it is small."""
-    aligned_copy = rows_of(array.shape, array.dtype)
+    aligned_copy = empty_rows(array.shape, array.dtype)
     aligned_copy[:] = array
     aligned_copy.setflags(write=False)
     return aligned_copy

@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import Axis, cell_of, make_axis
-from engine.bounding.bvh import WIDTH, build_stretched_bvh, rows_of
+from engine.bounding.bvh import WIDTH, build_stretched_bvh, empty_rows
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, reorder_by_tree
@@ -271,7 +271,7 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
     tree, origin, scale = build_stretched_bvh(boxes)
     check()
-    child, blocks = np.empty_like(tree.child), rows_of((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
+    child, blocks = np.empty_like(tree.child), empty_rows((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
     blocks[:] = 0.0
     reorder_by_tree(solid.vertices, solid.triangles, tree, origin, scale, child, triangles, blocks)
     check()

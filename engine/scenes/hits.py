@@ -15,7 +15,7 @@ from engine.containment.methods.rational_locate import to_body_frame, to_world_f
 from engine.errors import UnsupportedSolidError
 from engine.predicates.error_free import two_diff
 from engine.running.budget import Budget, Cancel, reading
-from engine.running.parallel import Progress, check_options
+from engine.running.parallel import Progress, check_options, join_columns
 from engine.scenes.near_boxes import near_pairs, scratch_for
 from engine.scenes.placements import Placements
 from engine.scenes.posed_cut import _turned
@@ -109,7 +109,7 @@ def _on_bodies(lines: Lines, scene: Placements, keep: int, budget: Budget, worke
             error = refused(solid, "hits does not take", lambda row: row.hits)
             raise UnsupportedSolidError(f"solids[{body}]: {error.message}", ("solids", body))
     met, is_open = (np.zeros(len(lines.rows), np.bool_) for _ in range(2))
-    merged = [_merged([], [], {}, keep)]
+    merged = list[SceneHits]()
     for near, groups in _near(lines, scene, budget):
         parts, bodies, starts = list[Hits](), list[IntArray](), dict[int, Any]()
         for rows in groups:
@@ -130,9 +130,13 @@ def _on_bodies(lines: Lines, scene: Placements, keep: int, budget: Budget, worke
             parts.append(hits)
             bodies.append(np.full(len(hits), body))
             starts[body] = partial(_exact_start, some, items, target, budget)
-        merged.append(_merged(parts, bodies, starts, keep))
-    joint = SceneHits(*(np.concatenate([getattr(each, name) for each in merged]) for name in SceneHits.__slots__))
-    return (met if keep == ANY else joint), int(is_open.sum())
+        if parts:
+            merged.append(_merged(parts, bodies, starts, keep))
+    n_open = int(is_open.sum())
+    if keep == ANY:
+        return met, n_open
+    columns = [[getattr(each, name) for name in SceneHits.__slots__] for each in merged or [_merged([], [], {}, keep)]]
+    return SceneHits(*join_columns(columns, budget, workers)), n_open
 
 
 def _near(lines: Lines, scene: Placements, budget: Budget) -> Iterator[tuple[IntArray, list[IntArray]]]:

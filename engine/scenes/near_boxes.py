@@ -16,7 +16,7 @@ from engine.compiling.jit import inline, kernel, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import array_at, lowest_bit
 from engine.segment_clipping.on_boundary.boundary_cut import Crossings
-from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, Way, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import Way, far_end, local_segment
 from engine.segment_clipping.on_boundary.triangle_contacts import corner
 from engine.segment_clipping.pieces import Pieces, point_of
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray, Point3
@@ -168,13 +168,9 @@ def way_of_line(lines: FloatArray, item: int, is_ray: bool, bodies: BodyTree) ->
     way = Point3(q.x * x, q.y * x, q.z * x)
     if not is_ray:
         way = Point3(way.x - p.x * x, way.y - p.y * x, way.z - p.z * x)
-    size, length = abs(start.x) + abs(start.y) + abs(start.z), max(abs(way.x), abs(way.y), abs(way.z))
-    is_small, reach = size < _FAR, 1.0
-    if is_ray:  # case: the direction is beyond doubles, or below them, in these coordinates
-        reach = (size + 4.0 * LIMIT) / length if length > 0.0 else np.inf
-        is_small &= length < np.inf and reach < np.inf
-    far = Point3(start.x + reach * way.x, start.y + reach * way.y, start.z + reach * way.z)
-    is_small &= max(abs(far.x), abs(far.y), abs(far.z)) < 2.0 * _FAR
+    far = far_end(start, way, is_ray)
+    sizes = abs(start.x) + abs(start.y) + abs(start.z), abs(far.x) + abs(far.y) + abs(far.z)  # sums: NaN stays
+    is_small = sizes[0] < _FAR and sizes[1] < 2.0 * _FAR
     return local_segment(start, far, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.0), is_small
 
 

@@ -234,8 +234,8 @@ def triangle_hit(elements: FloatArray, element: int, is_safe: bool, line: Line, 
     wh, wl = dd_add(ab[0], ab[1], bc[0], bc[1])
     wh, wl = dd_add(wh, wl, ca[0], ca[1])
     w = wh, wl, ab[2] + bc[2] + ca[2] + _RELATIVE * abs(wh)
-    t, is_last, sure = v[0] / wh, False, abs(wh) - w[2]
-    off = 1.01 * (v[2] + abs(t) * w[2]) / sure if sure > 0.0 else np.inf
+    t, is_last, least_w = v[0] / wh, False, abs(wh) - w[2]
+    off = 1.01 * (v[2] + abs(t) * w[2]) / least_w if least_w > 0.0 else np.inf
     if t - off > most * (1.0 + _NEAR_ONE) or (not line.is_ray and t - off > 1.0 + _NEAR_ONE):
         return _NO_HIT
     if not line.is_ray and t + off > 1.0 - _NEAR_ONE:

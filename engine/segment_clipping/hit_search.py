@@ -26,7 +26,7 @@ from engine.segment_clipping.hit_contacts import Line, triangle_hit
 from engine.segment_clipping.on_boundary.boundary_cut import Crossings, allocate_crossings, sort_crossings
 from engine.segment_clipping.on_boundary.contacts import Kind, Place, are_same_point, decode_place
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
-from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, local_segment, shear_of
+from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, far_end, local_segment, shear_of
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh
 from engine.segment_clipping.on_boundary.triangle_contacts import are_flush, corner
 from engine.types import OPEN, FlagArray, FloatArray, IntArray, Point3
@@ -98,8 +98,7 @@ def _search(mesh: Mesh, line: Line, keep: int, scratch: _Scratch, stop: FlagArra
     size, length = max(abs(start.x), abs(start.y), abs(start.z)), max(abs(way.x), abs(way.y), abs(way.z))
     if not (length > 0.0 and (size + 4.0 * LIMIT) / length < np.inf and size + length < np.inf):
         return UNSURE
-    reach = (size + 4.0 * LIMIT) / length if line.is_ray else 1.0
-    far = Point3(start.x + reach * way.x, start.y + reach * way.y, start.z + reach * way.z)
+    far = far_end(start, way, line.is_ray)
     local = local_segment(start, far, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), line.blur * max(x, y, z))
     (i, j, k), place, r, s, across, slack = shear_of(local)
     stack, keys, entered, cuts, last = scratch.stack, scratch.keys, scratch.entered, scratch.cuts, np.float32(1.0)

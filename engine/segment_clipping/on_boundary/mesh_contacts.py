@@ -86,6 +86,17 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: Any, blur: float) 
     )
 
 
+@inline
+def far_end(start: Point3, way: Point3, is_ray: bool) -> Point3:
+    """Return where a line from `start` ends, in tree coordinates: of a ray a point beyond every box, which is no number
+    where its direction is 0, or beyond doubles."""
+    size, length = max(abs(start.x), abs(start.y), abs(start.z)), max(abs(way.x), abs(way.y), abs(way.z))
+    reach = 1.0
+    if is_ray:
+        reach = (size + 4.0 * LIMIT) / length if length > 0.0 else np.inf
+    return Point3(start.x + reach * way.x, start.y + reach * way.y, start.z + reach * way.z)
+
+
 @merged
 def _segment_before(p: Point3, q: Point3, origin: Any, inverse: Any, blur: float) -> Way:
     """Return the line p q before p, from beyond the tree if p is near it, as a `Way`. Its far end is rounded in tree
