@@ -210,7 +210,7 @@ async def _parts_of(receive: Receive, most: int, seconds: float) -> AsyncIterato
         for line, text in enumerate([*whole, last], number + 1):
             if len(text) > most:
                 what = f"line {line} is longer than {most} bytes"
-                raise ServiceError("body_too_large", f"{what}; split it, or raise GEOMETRY_MAX_BODY_BYTES")
+                raise ServiceError("body_too_large", f"{what}; make it shorter, or raise GEOMETRY_MAX_BODY_BYTES")
         for text in whole if is_more else [*whole, last]:
             number += 1
             text = text.strip().removeprefix(b"\x1e")

@@ -260,8 +260,8 @@ class Budget:
             raise CancelledError("another part of the call failed")
 
     def left(self) -> float | None:
-        """Return the seconds until the deadline, None without one."""
-        return None if self._end is None else self._end - time.monotonic()
+        """Return the seconds until the deadline, 0.0 after it, None without one."""
+        return None if self._end is None else max(self._end - time.monotonic(), 0.0)
 
     def take(self, n_bytes: int) -> None:
         """Announce by how many bytes an answer is about to grow, if the arguments do not bound its size."""

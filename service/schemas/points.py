@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
+from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
 from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
 from service.schemas.geojson import OrGeoJson
 from service.schemas.solids import (
@@ -103,7 +103,7 @@ class DistancesRequest(Schema):
 
     solid: Solid = optional("Neither implicit nor csg; a triangle of space is flat here. Either this or `lines`.")
     lines: Annotated[
-        Array, Numbers(Axis(1, "max_points"), Axis(2, "max_points"), DIMENSION, ragged=True), OrGeoJson("LineString")
+        Array, Numbers(Axis(1, "max_points"), Axis(2, "max_points"), PAIR, ragged=True), OrGeoJson("LineString")
     ] = optional("Polylines of the plane, two positions or more each, or GeoJSON of lines: distances from the nearest.")
     points: Points = Field(description="Positions of the solid's dimension, or GeoJSON of points.")
     pose: RigidPose = optional("Where the solid is; where its coordinates have it, unless given.")
