@@ -175,8 +175,9 @@ def relate_two(
     theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray, is_boolean: bool,
     is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Relate two outlines, each under a rotation (2, 2) and a translation (2,); the results and the last arguments are
-    those of `_relate`."""
+    """Relate two outlines as `relate_placed` does. vertices .. sides, and other .. their_sides: arrays of each, as from
+    `outline_arrays`; turn (2, 2), move (2,), and their_turn, their_move: rotation and translation of each. is_boolean,
+    is_named: as in `_relate`."""
     n, m = len(vertices), len(other)
     flat = np.empty(6 * (n + m))
     boxes = np.empty((2 * (n_leaves(n) + n_leaves(m)), 4))

@@ -78,7 +78,8 @@ def _is_in_sector(by_start: int, by_end: int, turn: int, is_start: bool) -> bool
 
 @inline
 def _is_same_way(p: Any, s: Any, t: Any, side: int, error: float) -> bool:
-    """Return whether s and t lie in one direction from p. side: the sign of the turn from s to t."""
+    """Return whether s and t, placed vertices, lie in one direction from p. side: the sign of the turn from s to t
+    about p; error: bound on each coordinate."""
     if side != 0 or order(s, p, 0, error) != order(t, p, 0, error):
         return False
     return order(s, p, 1, error) == order(t, p, 1, error)
@@ -104,9 +105,9 @@ def _sector_bits(p: Any, before: Any, later: Any, side: int, c: Any, d: Any, the
 
 @called
 def _contact_bits(own: PlacedOutline, edge: int, their: PlacedOutline, other: int, error: float) -> int:
-    """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST proven near the points where edge `edge` of one placed body
-    meets edge `other` of another, if these are vertices but not the start of either edge: there the edge before ends.
-    """
+    """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that are proven by the vertices at which edge `edge` of
+    `own` meets edge `other` of `their`. A vertex that is the start of one of these edges is left out: it is the end of
+    the edge before."""
     after_edge, after_other = own.following[edge], their.following[other]
     a, b, c, d = _spot(own, edge), _spot(own, after_edge), _spot(their, other), _spot(their, after_other)
     side, their_side, bits = own.sides[edge], their.sides[other], 0

@@ -107,7 +107,9 @@ class KernelCache(NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, types: Any, result: CompileResult) -> None:
-        """Store a kernel, if its sources are those that its name says."""
+        """Store the machine code of the kernel compiled for arguments of these types; numba calls this. Nothing is
+        stored for code with dynamic globals, or where the code that runs may not be that of the sources on disk, of
+        which the file's name has a digest."""
         module = self._function.__module__
         if not result.library.has_dynamic_globals and source_digest(module) and matches_its_source(module):
             (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()

@@ -17,7 +17,9 @@ from engine.types import FloatArray, IntArray
 def welded(
     points: FloatArray, faces: IntArray, distance: float, budget: Budget, mended: list[str]
 ) -> tuple[FloatArray, IntArray]:
-    """Return the mesh with vertices that are at most so far apart made one, each group the first of its members."""
+    """Merge vertices within `distance` of each other, also through chains of such vertices: return the points,
+    unchanged, and the faces with the smallest index of each group in place of its members, collapsed faces left out.
+    What was done is appended to `mended`."""
     used = np.unique(faces)
     spots = points[used]
     with np.errstate(over="ignore"):  # boxes and distances beyond the largest double
@@ -40,7 +42,8 @@ def welded(
 
 
 def _join(root: IntArray, first: IntArray, second: IntArray, budget: Budget) -> None:
-    """Make pairs of vertices one, whatever they are one with already: root (n,) has the smallest of each group."""
+    """Unite the groups of vertices first[k] and second[k], for each k. root (n,): by vertex the smallest vertex of its
+    group, updated."""
     while len(first):  # bound: a group loses its root each turn
         budget.check()
         one, other = root[first], root[second]
@@ -82,13 +85,14 @@ def filled(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str
 
 
 def _is_on_itself(face: list[int], on: dict[tuple[int, int], list[int]]) -> bool:
-    """Return whether a corner of a face is on the side opposite to it. on: the vertices on an edge."""
+    """Return whether a corner of a triangle lies on its own opposite edge. on: by edge the vertices in its interior."""
     sides = zip(face, [*face[1:], face[0]], [*face[2:], *face[:2]])
     return any(apex in on.get((min(a, b), max(a, b)), ()) for a, b, apex in sides)
 
 
 def oriented(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str]) -> IntArray:
-    """Return the triangles turned so that neighbours run alike, and closed shells as nesting has them."""
+    """Return the triangles, some turned over: adjacent ones run along their common edge in opposite directions, and
+    closed shells face outward or inward as their nesting asks. What was done is appended to `mended`."""
     edges = edges_of(faces)
     users: dict[int, list[int]] = defaultdict(list)
     for face, own in enumerate(polled(edges.of.tolist())):

@@ -44,8 +44,8 @@ _BELOW_ONE: Final = 1.0 - 2.0**-20
 def boxes_within(
     boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, bounds: Rows, row: int
 ) -> int:
-    """Write lower bounds on the squared distances of a point from the boxes of a node's children to a row of work;
-    return the nearest as `nearest_of` does."""
+    """Write to row `row` of bounds lower bounds on the squared distances of the point (x, y, z) from the boxes of a
+    node's children, enlarged by margin; return the children with the least one, as bits."""
     box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     gaps = [greater(abs(box[k] - at) - (box[3 + k] + margin), 0.0) for k, at in enumerate((x, y, z))]
     low = dot(gaps, gaps) * _BELOW_ONE
@@ -57,7 +57,8 @@ def boxes_within(
 def boxes_toward(
     boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, bounds: Rows, row: int
 ) -> int:
-    """Do so for a distant point in the direction x, y, z: the bounds are on distances less its own from the origin."""
+    """Do the same as `boxes_within` for a point infinitely far away in the direction (x, y, z): the bounds are on each
+    distance minus that from the origin."""
     box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     along, reach = dot((x, y, z), box[:3]), dot((abs(x), abs(y), abs(z)), box[3:])
     low = -(along + reach) - margin
@@ -80,8 +81,9 @@ def _least_lanes(low: Lanes) -> int:
 def triangles_toward(
     blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, more: Number, most: Number, work: Rows
 ) -> int:
-    """Bound the distances of a distant point in the direction x, y, z from the triangles of a block, less its distance
-    from the origin, as `triangle_bounds` does."""
+    """Bound the distances of the triangles of a block from a point infinitely far away in the direction (x, y, z), each
+    minus its distance from the origin; result, most and work as in `triangle_bounds`. slack: error of a bound; more: by
+    how much the upper bounds are larger."""
     corners = [[load(blocks, CORNER_ROWS * node + 3 * corner + k) for k in range(3)] for corner in range(3)]
     a, b, c = (dot((x, y, z), corner) for corner in corners)
     level = -greater(a, greater(b, c))
@@ -89,8 +91,8 @@ def triangles_toward(
 
 
 def _write(low: Lanes, high: Lanes, most: Number, work: Rows) -> int:
-    """Write the least of upper bounds to row 0 of work, lower bounds to row 1; return the mask of the triangles that
-    may be the nearest and within `most`."""
+    """Write bounds on eight distances to work: the least of `high`, the upper ones, to row 0, `low`, the lower ones, to
+    row 1; return the mask of the lanes that may have the least distance, and one of at most `most`."""
     least = least_of(high)
     store(work, 0, least)
     store(work, 1, low)

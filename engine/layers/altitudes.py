@@ -10,10 +10,11 @@ from engine.types import FloatArray, IntArray
 
 
 def heights_at(places: FloatArray, rows: IntArray, sources: list[tuple[FloatArray, IntArray]]) -> FloatArray | None:
-    """Return the altitude of each of n vertices of rows, NaN for new ones; None if there are no altitudes at all.
+    """Return the altitude of each of n vertices of an answer, NaN for new ones; None if the input has no altitudes.
 
-    places, rows (n, 2), (n,): vertices, and the row of each. sources: known vertices as rows (feature, x, y, altitude),
-    and by row the feature, or the group, that it comes from. Of two at a vertex the first counts."""
+    places (n, 2), rows (n,): vertices, and the row of each. sources: for each input layer its vertices with altitude
+    (m, 4), feature, x, y, altitude, and (n_rows,) the feature that each row comes from (or its group, if the first
+    column has groups). Of two altitudes at a vertex the first counts."""
     heights = np.full(len(places), np.nan)
     sides = [(known[~np.isnan(known[:, 3]) & (known[:, 0] != NONE)], of_rows) for known, of_rows in sources]
     if not len(places) or not any(len(known) for known, _ in sides):

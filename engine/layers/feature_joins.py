@@ -190,8 +190,9 @@ def _answered(
     sides: list[Collection], names: tuple[str, str], function: Callable[[MixedLayer, MixedLayer], _Joined],
     outside: bool, limits: Limits, report: bool,
 ) -> Answer:  # fmt: skip
-    """Return the rows of a join, with the geometry and members of the first feature and the members of the second;
-    outside: also a row for each first feature without a second."""
+    """Return the rows of a join, each with geometry and members of the first feature and members of the second. sides:
+    both collections; function: the join of them as layers, which returns pairs of features; outside: also a row for
+    each first feature without a second."""
     crs = crs_of(sides if names[0] == "left" else sides[:1], limits)
     geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
     write_members, n_bytes = members_of(sides, names, limits)

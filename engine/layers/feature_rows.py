@@ -160,7 +160,8 @@ def with_geometries(
 
 
 def _polygons(areas: Areas, row: int, listed: Callable[[int, int], Any]) -> list[list[Any]]:
-    """Return the rings of each piece of a row; listed: the positions from one number to another."""
+    """Return the pieces of a row, each a list of rings, as nested lists. listed(start, stop): those positions as
+    lists."""
     _, (rings, pieces, ends) = areas
     return [
         [listed(i, j) for i, j in pairwise(rings[first : last + 1].tolist())]
@@ -169,5 +170,6 @@ def _polygons(areas: Areas, row: int, listed: Callable[[int, int], Any]) -> list
 
 
 def _joined(kind: str, parts: list[Any]) -> dict[str, Any]:
-    """Return one part, or several, as a GeoJSON geometry."""
+    """Return a GeoJSON geometry of type `kind` for one part, of the Multi type for several. parts: coordinates of
+    each."""
     return {"type": f"Multi{kind}", "coordinates": parts} if len(parts) > 1 else {"type": kind, "coordinates": parts[0]}

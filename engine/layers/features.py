@@ -268,7 +268,8 @@ def _answered(
     sides: list[Collection], names: tuple[str, ...], function: Callable[[MixedLayer, MixedLayer], LayerRows],
     min_width: float | None, limits: Limits, report: bool,
 ) -> Answer:  # fmt: skip
-    """Return rows, a function of two layers, with the members and altitudes of those that have a name."""
+    """Return the rows that `function` gives for the layers of `sides`, with altitudes and with the members of the
+    features they come from. names: of the members in which a row says which features these are, one a layer."""
     crs = crs_of(sides, limits)
     write_members, n_bytes = members_of(sides[: len(names)], names, limits)
     rows = function(*(mixed_of(side, limits) for side in sides))

@@ -168,8 +168,9 @@ def joined(
     left: GeoDataFrame, right: GeoDataFrame, pairs: IntArray, how: str, suffixes: tuple[str, str],
     distances: FloatArray | None = None, column: str | None = None,
 ) -> GeoDataFrame:  # fmt: skip
-    """Return the rows of a join. pairs (n, 2): features, sorted by the side that `how` names, the left one by default;
-    column: name for distances (n,)."""
+    """Return a join as a GeoDataFrame, with the columns of geopandas.sjoin. pairs (n, 2): left and right feature of
+    each row, sorted by the side that `how` names, the left one for inner. distances (n,): put in the column named
+    `column`, if given."""
     first, second = pairs.T
     places = np.arange(len(pairs))
     if how == "left":
@@ -202,8 +203,8 @@ def _assembled(
 def _by_geopandas(
     left: GeoDataFrame, right: GeoDataFrame, first: IntArray, second: IntArray, how: str, suffixes: tuple[str, str]
 ) -> GeoDataFrame:
-    """Return such rows as geopandas joins them, which names columns and indexes; points on a line, one for each row,
-    stand for the geometries."""
+    """Return the rows (first[k], second[k]) joined by geopandas itself, so that it names columns and indexes: points at
+    different places, one for each row, stand for the geometries, which are put back afterwards."""
     geopandas, _ = geopandas_and_shapely()
     sides, points = [], geopandas.points_from_xy(np.arange(len(first)), np.zeros(len(first)))
     for side, rows in ((left, first), (right, second)):

@@ -316,8 +316,8 @@ def dissolve(
 
 
 def _geometries(rows: LayerRows, empty: Any = None, source: Any = None) -> Any:
-    """Return an array of the rows' geometries, `empty` for a row without parts; parts of several dimensions make a
-    GeometryCollection. source: the left geometries, of which Points are taken as they are."""
+    """Return the geometries of rows as an array of shapely, `empty` for a row without parts; a row with parts of
+    several dimensions is a GeometryCollection. source: the left layer's geometries; points are taken from there."""
     _, shapely = geopandas_and_shapely()
     positions, (rings, pieces, ends) = rows.ragged
     points, lines = shapely.points(rows.touching.places), shapely.GeometryType.LINESTRING
@@ -343,8 +343,8 @@ def _geometries(rows: LayerRows, empty: Any = None, source: Any = None) -> Any:
 
 
 def _with_altitudes(geometries: Any, sources: list[tuple[GeoDataFrame, IntArray, IntArray | None]]) -> Any:
-    """Return the geometries of rows with the altitudes of their features, as `heights_at` has them. sources: layers; by
-    row the feature, or the group, that it comes from; by feature its group, None where rows are of features."""
+    """Return geometries of rows with altitudes (`heights_at`). sources: for each input layer the frame; by row the
+    feature, or the group, that it comes from; by feature its group, None where rows come from features."""
     _, shapely = geopandas_and_shapely()
     known = []
     for frame, of_rows, groups in sources:

@@ -51,8 +51,8 @@ def gaps_of(union: Overlay, polygons: PolygonArrays) -> list[Place]:
 
 
 def _corners(ring: list[list[float]]) -> tuple[Place, ...]:
-    """Return the vertices of a simple ring where it turns, from the lexicographically first on, towards the lower of
-    its neighbours: equal for equal rings."""
+    """Return the corners of a simple ring (vertices where it turns), from the lexicographically first on, in the
+    direction of the lower of its neighbours: equal for rings of one shape, however they are written."""
     places = [(x + 0.0, y + 0.0) for x, y in ring]
     n = len(places)
     turns = [p for k, p in enumerate(places) if orient2d_rational(places[k - 1], p, places[(k + 1) % n]) != 0]

@@ -48,9 +48,9 @@ _PARTS: Final[dict[str, Callable[[Any], Any]]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collection:
-    """A FeatureCollection whose geometries are of one kind: its features, the properties of each (empty for null), its
-    `crs`, and the path of the argument, for messages. start: of a part of a stream, the number of the features before
-    it; kept: what was made of a collection that many calls share."""
+    """A FeatureCollection as it came: its features, the properties of each (empty for null), its `crs`, and the path of
+    the argument, for messages. start: of a part of a stream, the number of features before it. kept: what was computed
+    from a collection that several calls use, by name."""
 
     features: list[dict[str, Any]]
     properties: list[dict[str, Any]]
@@ -61,7 +61,8 @@ class Collection:
 
     @property
     def known(self) -> FloatArray:
-        """The vertices, if some have an altitude, once they are read: feature, x, y, altitude."""
+        """The vertices with altitude, (m, 4): feature, x, y, altitude; (0, 4) if there are none or coordinates have not
+        been read."""
         return cast(FloatArray, self.kept.get("known", np.zeros((0, 4))))
 
 

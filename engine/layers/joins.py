@@ -86,8 +86,9 @@ def _boxes_allow(predicate: str, left: Shapes, right: Shapes, pairs: IntArray) -
 
 
 def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limits) -> tuple[Shapes, Shapes]:
-    """Return two layers as edges in the range of exact signs. Raises: NotRepresentableError if there is no scale, or
-    they need one where distances are measured."""
+    """Return two layers as `Shapes`, scaled so that signs of their coordinates are exact; polygons that are not simple
+    are united with themselves first. is_measured: distances will be taken, for which no scale may be needed. Raises:
+    NotRepresentableError if there is no such scale, or a scale is needed where distances are measured."""
     for layer in (left, right):
         if "shapes" not in layer.prepared:
             shapes, wrong = shapes_of(layer, limits)
@@ -134,7 +135,8 @@ def _of_points(left: MixedLayer, right: MixedLayer, predicate: str, limits: Limi
 
 
 def _cleaned(layer: MixedLayer, wrong: IntArray, limits: Limits) -> MixedLayer:
-    """Return a layer with some polygons united with themselves: of simple rings that do not cross."""
+    """Return a layer in which the polygons numbered `wrong` are united with themselves, so that their rings are simple
+    and do not cross."""
     arrays = layer.areas.arrays
     places = np.arange(len(layer.areas))
     places[wrong] = len(places) + np.arange(len(wrong))

@@ -50,8 +50,9 @@ class Limits:
         return Budget(self.options()["deadline"], self._cancel)
 
     def pairs_of_boxes(self, low: FloatArray, high: FloatArray, is_chosen: Any = None, n_bytes: int = 16) -> IntArray:
-        """Return pairs (n, 2), first < second, sorted, of boxes that intersect. is_chosen: function of pairs that says
-        which are returned; n_bytes: memory that is charged for one."""
+        """Return pairs (m, 2), first < second, sorted, of closed boxes low, high (n, d) that intersect.
+        is_chosen(pairs): optional, (k,) bool, which of a block to return; n_bytes: memory charged to the budget for a
+        pair."""
         blocks = [np.zeros((0, 2), np.int64)]
         with self.budget() as budget:
             for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():

@@ -52,7 +52,7 @@ def _kind_of(error: NotJsonError) -> type[InvalidInputError]:
 
 
 def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limits) -> list[bytes]:
-    """Return each value, one for each feature of the layer, as JSON. member: of the feature, where the value stands
+    """Return values, one for each feature of a layer, as JSON texts. member: the member of the feature that they are of
     (properties, id, geometry), for messages."""
     texts: list[bytes] = []
     with limits.budget() as budget:

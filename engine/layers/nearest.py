@@ -99,7 +99,8 @@ def _of(pairs: IntArray, reaches: FloatArray) -> IntArray:
 def _ties(
     left: Shapes, right: Shapes, pairs: IntArray, bounds: _Bounds, most: float, limits: Limits
 ) -> tuple[IntArray, FloatArray]:
-    """Return those of pairs, sorted by left feature, whose exact distance is the least, and at most `most`."""
+    """Return the pairs, of candidates (n, 2) sorted by left feature, that have the least exact distance of their left
+    feature, at most `most`; and these distances, as nearest doubles. bounds: of the candidates' distances."""
     distances, is_sure = _rounded(bounds)
     n = np.bincount(pairs[:, 0], minlength=len(left.dims))[pairs[:, 0]]
     stays = bounds.high == 0.0
@@ -120,8 +121,9 @@ def _ties(
 
 
 def _rounded(bounds: _Bounds) -> tuple[FloatArray, BoolArray]:
-    """Return distances, and where these are the nearest doubles for certain: in long doubles, where these are longer,
-    with 12 units of their rounding for the differences, products, sum, quotient and root, and the products' size."""
+    """Return the distances (n,) of pairs by their `_Bounds.rows`, and (n,) whether each is certainly the nearest
+    double: in long doubles, with 12 units of their rounding for the differences, products, sum, quotient and root, and
+    the products' size."""
     unit = float(np.finfo(np.longdouble).eps)
     with np.errstate(all="ignore"):
         x, y, ax, ay, bx, by = bounds.rows.astype(np.longdouble).T
@@ -165,9 +167,14 @@ def _exact_square(row: tuple[float, ...]) -> Fraction:
 
 
 class _Bounds(NamedTuple):
-    """Bounds of the distances of n pairs. low, high (n,): infinite beyond the reach; rows (n, 6): a point and a segment
-    at about the least distance, whose two ends are one point where it is that of two points; is_alone (n,): whether no
-    others may be as near."""
+    """Bounds on the distances of n pairs of features.
+
+    | field | shape | meaning |
+    |---|---|---|
+    | low, high | (n,) | distance from below and above; infinity beyond the reach |
+    | rows | (n, 6) | point x, y and segment x, y, x, y at about the distance; for two points the segment is a point |
+    | is_alone | (n,) | whether no other point and segment of the pair may be as near |
+    """
 
     low: FloatArray
     high: FloatArray
@@ -182,8 +189,9 @@ class _Bounds(NamedTuple):
 def _bounds(
     left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, is_least: bool, limits: Limits
 ) -> _Bounds:
-    """Return bounds of the distances of pairs, sorted by left feature, that do not meet (reaches of others: -infinity);
-    is_least: only of those that may be the least of their left feature."""
+    """Return bounds on the distances of pairs (n, 2), sorted by left feature. reaches (n,): a larger distance may be
+    given as infinity; -infinity for pairs that meet, of which nothing is measured. is_least: also those larger than
+    another of the same left feature may be infinite."""
     n = len(pairs)
     made = _Bounds(np.full(n, np.inf), np.full(n, np.inf), np.zeros((n, 6)), np.zeros(n, np.bool_))
     with limits.budget() as budget:
@@ -208,7 +216,8 @@ def _measure(
     left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, is_least: bool, low: FloatArray,
     high: FloatArray, rows: FloatArray, is_alone: BoolArray, state: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill the arrays of `_Bounds`."""
+    """Fill low .. is_alone, the fields of `_Bounds`, for pairs (n, 2); reaches, is_least: as in `_bounds`. state
+    (_N_STATE,): scratch."""
     none, least, before = rows[:0], np.inf, np.int64(-1)
     for item in range(len(pairs)):
         if flag[0] != 0:
@@ -242,17 +251,20 @@ def _gap(boxes: FloatArray, node: int, others: FloatArray, other: int) -> float:
 def _list_near(
     left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: FloatArray, state: FloatArray, flag: FlagArray
 ) -> int:
-    """Fill rows (n, 6) with vertices and edges (x, y, x, y, x, y) that may be within `reach`; return their number."""
+    """Fill rows (n, 6) with pairs of a vertex of one feature and an edge of the other (x, y, x, y, x, y) that may be
+    within `reach`; return their number, maybe more than the room."""
     own, their = shape_of(left, i), shape_of(right, j)
     return _scan(their, own, reach, rows, _scan(own, their, reach, rows, 0, state, flag), state, flag)
 
 
 @called
 def _scan(own: Shape, their: Shape, reach: float, rows: FloatArray, n: int, state: FloatArray, flag: FlagArray) -> int:
-    """Update the state by the distances within `reach` of vertices of one feature from edges of another.
+    """Measure each vertex of one feature against the edges of the other that may be within `reach` of it, and update
+    `state` (columns above) by these distances; return n.
 
-    rows: where there are any, the same is put there from row n on instead, and the number of all returned. A vertex and
-    the end of an edge are a row with that end twice, the lower of the two points first."""
+    With rows (m, 6) not empty, the vertices and edges are written there instead, from row n on, and the number of rows
+    with them is returned, maybe more than m. Where an end of the edge is the nearest point, the row has that end as
+    both ends of the edge, and the lower of the two points first, so that it is equal seen from either feature."""
     leaves, m, is_list = len(their.boxes) // 2, len(their.following), len(rows) > 0
     for vertex in range(len(own.following)):
         if flag[0] != 0:
@@ -295,7 +307,7 @@ def _put(rows: FloatArray, n: int, p: Point2, a: Point2, b: Point2) -> None:
 
 @inline
 def _is_put(state: FloatArray, p: Point2, a: Point2, b: Point2) -> bool:
-    """Return whether this is the nearest row so far."""
+    """Return whether `state` already has vertex p and edge ab as the nearest so far."""
     return (
         (state[0] == p.x) & (state[1] == p.y) & (state[2] == a.x) & (state[3] == a.y) & (state[4] == b.x)
         & (state[5] == b.y) & (state[_ROW] < np.inf)
@@ -304,7 +316,8 @@ def _is_put(state: FloatArray, p: Point2, a: Point2, b: Point2) -> bool:
 
 @inline
 def _enter(state: FloatArray, p: Point2, a: Point2, b: Point2, distance: float, error: float) -> None:
-    """Make a row the nearest so far, or another."""
+    """Update `state` by vertex p and edge ab, whose distance is known to +- error: they become the nearest so far, or
+    else lower the bound on all others."""
     low = max(0.0, distance - error)
     if distance < state[_ROW]:
         state[_RIVAL] = min(state[_RIVAL], state[_LOW])
@@ -316,8 +329,8 @@ def _enter(state: FloatArray, p: Point2, a: Point2, b: Point2, distance: float, 
 
 @inline
 def _distance(p: Point2, a: Point2, b: Point2) -> tuple[float, float, int]:
-    """Return the distance of p from the segment ab, rounded, a bound on its error, and whether it is that of a (-1), of
-    b (1) or of a point between (0)."""
+    """Return the rounded distance of p from segment ab, a bound on its error, and which point of the segment is
+    nearest: a (-1), b (1), or one between (0)."""
     x, y, ux, uy = p.x - a.x, p.y - a.y, b.x - a.x, b.y - a.y
     along, length = x * ux + y * uy, ux * ux + uy * uy
     error = _ERROR * (abs(x) + abs(y) + abs(ux) + abs(uy)) + _TINY

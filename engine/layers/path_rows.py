@@ -46,8 +46,14 @@ from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
 class _Intervals(NamedTuple):
-    """Stretches of segments. key, segment (m,): sorted by; ends (2, m, 2): their points; own (2, m): whether an end is
-    the segment's own."""
+    """Stretches of input segments inside regions, sorted by key, then segment.
+
+    | field | shape | meaning |
+    |---|---|---|
+    | key, segment | (m,) | the region's number, and the input segment |
+    | ends | (2, m, 2) | first and last point |
+    | own | (2, m) | whether that point is the segment's own end |
+    """
 
     key: IntArray
     segment: IntArray
@@ -93,8 +99,8 @@ def clip_mixed(
 
 
 def _clip_areas(layer: MixedLayer, pieces: PolygonArrays, limits: Limits, with_touching: bool) -> list[LayerRows]:
-    """Return the rows of polygons, each cut by the pieces of a mask. Those that meet no boundary are inside or outside;
-    of others that are near one piece, this piece alone counts."""
+    """Return the rows of a layer's polygons, each clipped to `pieces`, the disjoint polygons of a mask. A polygon that
+    meets no boundary of the mask is taken whole or left out; one near a single piece is clipped to that piece alone."""
     arrays, own = layer.areas.arrays, np.flatnonzero(layer.areas.arrays.sizes())
     whole = pieces.merged(np.array([0, len(pieces.polygon_offsets) - 1]))
     inside = own[:0]
@@ -139,8 +145,9 @@ def sorted_rows(parts: list[LayerRows]) -> LayerRows:
 def path_rows(
     paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits, kinds: frozenset[int]
 ) -> LayerRows:
-    """Return the parts of points and lines within polygons, a row for each feature and key; or those outside of all.
-    keys: by polygon its number in rows; equal ones are one region. kinds: dimensions of parts that stay."""
+    """Return a row for each feature of points or lines and each key, with the parts of the feature in the polygons that
+    have that key; is_outside: rows of the parts that are in no polygon. keys: by polygon a number; polygons of one
+    number are one region. kinds: dimensions of parts that stay."""
     kinds_of = {POINT: _of_points, LINE: _of_lines}
     made = [
         parts_of(paths, areas, keys, is_outside, limits)
@@ -164,19 +171,23 @@ def path_rows(
 
 
 def _unique(first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the distinct pairs of numbers that are not negative (n, 2), sorted, and the place of each pair in them."""
+    """Return the distinct pairs (first[k], second[k]), both >= 0, as (n, 2) sorted, and by k the row there."""
     n = int(second.max(initial=0)) + 1
     names, places = np.unique(first * n + second, return_inverse=True)
     return np.column_stack(np.divmod(names, n)), places
 
 
 class _Parts(NamedTuple):
+    """Points and lines of an answer: vertices (n, 2), and offsets (m + 1,) of parts into them; a point has one
+    vertex."""
+
     vertices: FloatArray
     offsets: IntArray
 
 
 def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
-    """Return (feature, key) of each part, and the parts, of the points of a layer."""
+    """Return (m, 2) rows (feature, key), and as `_Parts` the points that a layer's point features have in the polygons
+    with that key. keys: by polygon. is_outside: the points in no polygon instead, with key 0."""
     paths = paths.of(POINT)
     vertices, features = paths.vertices, paths.owners()[1]
     points, polygons = single_points(vertices), MixedLayer(areas, no_paths(len(areas)))
@@ -191,7 +202,8 @@ def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, lim
 
 
 def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
-    """Return (feature, key) of each part, and the parts, of the lines of a layer."""
+    """Return (m, 2) rows (feature, key), and as `_Parts` the lines that a layer's line features have in the polygons
+    with that key. keys: by polygon. is_outside: what is in no polygon instead, with key 0."""
     path, features = paths.owners()
     firsts = np.flatnonzero((path[:-1] == path[1:]) & (paths.dims[features[:-1]] == LINE))
     segments = read_only(np.stack([paths.vertices[firsts], paths.vertices[firsts + 1]], axis=1))
@@ -232,7 +244,8 @@ def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limi
 
 
 class _Ranked(NamedTuple):
-    """Pieces with the order of their ends: fields as those of `ScenePieces`."""
+    """Pieces of segments in bodies with `ranks` (n, 2), numbers that order all ends along their segments, equal for
+    equal points; the other fields as in `ScenePieces`."""
 
     source: IntArray
     body: IntArray
@@ -245,7 +258,8 @@ class _Ranked(NamedTuple):
 def _ranked(
     pieces: LoosePieces, segments: FloatArray, solids: PolygonArrays, scene: Scene, budget: Budget, workers: int | None
 ) -> _Ranked:
-    """Return pieces of segments with ranks of their ends. solids: the bodies of the scene."""
+    """Return pieces of segments (n, 2, 2) with the ranks of their ends: by t where all differ or lie on one edge, else
+    exactly. solids: the bodies of the scene."""
     m, twice = len(pieces.source), np.repeat(np.arange(len(pieces.source)), 2)
     segment, t, faces = pieces.source[twice], pieces.t.ravel(), pieces.faces.ravel()
     order = np.lexsort((t, segment))
@@ -278,7 +292,7 @@ def _ranked(
 
 
 def _merged(keys: IntArray, pieces: _Ranked) -> _Intervals:
-    """Return the union of pieces of one key on each segment. keys: by body."""
+    """Return the union, on each segment and for each key, of the pieces in bodies with that key. keys: by body."""
     keys = keys[pieces.body]
     order = np.lexsort((pieces.ranks[:, 1], pieces.ranks[:, 0], keys, pieces.source))
     key, segment, (first, last) = keys[order], pieces.source[order], pieces.ranks[order].T
@@ -303,7 +317,8 @@ def _merged(keys: IntArray, pieces: _Ranked) -> _Intervals:
 
 
 def _between(inside: _Intervals, segments: FloatArray) -> _Intervals:
-    """Return the stretches of all segments outside of intervals, which are disjoint, of one key and sorted."""
+    """Return the stretches of segments (n, 2, 2) that no interval covers, with key 0. inside: disjoint intervals,
+    sorted along each segment, all of one key."""
     n, m = len(segments), len(inside.segment)
     every, own = np.arange(n), np.ones(n, np.bool_)
     begins = np.argsort(np.concatenate([every, inside.segment]), kind="stable")

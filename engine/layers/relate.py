@@ -43,7 +43,8 @@ PREDICATES: Final = (
 
 
 def holds(predicate: str, bits: IntArray, dims: Int8Array, their_dims: Int8Array) -> BoolArray:
-    """Return whether a predicate of `PREDICATES` holds, for pairs with these matrices and dimensions."""
+    """Return (n,) bool: whether a predicate of `PREDICATES` holds. bits, dims, their_dims (n,): by pair its
+    intersection matrix, and the dimensions of its first and of its second feature."""
     has = {name: (bits & bit) != 0 for name, bit in (("ii", II), ("ie", IE), ("be", BE), ("ei", EI), ("eb", EB))}
     meet, is_long, is_even = (bits & _MEET) != 0, (bits & LONG) != 0, dims == their_dims
     is_in, is_around = ~has["ie"] & ~has["be"], ~has["ei"] & ~has["eb"]
@@ -60,7 +61,7 @@ def holds(predicate: str, bits: IntArray, dims: Int8Array, their_dims: Int8Array
 
 
 def transposed(bits: IntArray) -> IntArray:
-    """Return the matrices of the second to the first."""
+    """Return the intersection matrices (n,) of the same pairs with first and second feature exchanged."""
     made = bits & (II | BB | LONG)
     for one, other in ((IB, BI), (IE, EI), (BE, EB)):
         made |= np.where(bits & one, other, 0) | np.where(bits & other, one, 0)
@@ -70,8 +71,9 @@ def transposed(bits: IntArray) -> IntArray:
 def matrices(
     left: Shapes, right: Shapes, pairs: IntArray, is_any: bool, budget: Budget, workers: int | None
 ) -> IntArray:
-    """Return the bits of pairs (n, 2) of features in range, the first of no larger dimension than the second. is_any:
-    only whether they meet, as any of the bits."""
+    """Return (n,) the intersection matrix of each pair (n, 2) of features, as bits (II, IB, ...). Caller guarantees
+    scaled coordinates (`in_range`), and a first feature of no larger dimension than the second. is_any: any bit is set
+    if the two meet, none else; that is faster."""
     bits = np.zeros(len(pairs), np.int64)
     most = max((int(np.diff(each.firsts).max(initial=0)) for each in (left, right)), default=0)
 
@@ -88,7 +90,7 @@ def matrices(
 def _relate_pairs(
     left: Shapes, right: Shapes, pairs: IntArray, is_any: bool, room: FloatArray, bits: IntArray, flag: FlagArray
 ) -> None:
-    """Fill bits (n,); room: as `_half`."""
+    """Fill bits (n,) with the intersection matrix of each pair (n, 2) of features. is_any, room: as in `_half`."""
     for item in range(len(pairs)):
         if flag[0] != 0:
             return
@@ -98,7 +100,7 @@ def _relate_pairs(
 
 @called
 def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: FlagArray) -> int:
-    """Return the bits of two features; is_any, room: as `_half`."""
+    """Return the intersection matrix of two features, as bits. is_any, room: as in `_half`."""
     if own.dim == POINT and their.dim == AREA:
         return _of_points(own, their, is_any, flag)
     bits = _half(own, their, is_any, room, flag)
@@ -119,8 +121,9 @@ def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: Flag
 
 @inline
 def _of_areas(bits: int, back: int) -> int:
-    """Return the bits of two areas from those of the edges of each: beside an edge of one, in a face of the other, are
-    its interior and its exterior."""
+    """Return the intersection matrix of two areas. bits: what `_half` gives for the edges of the first in the second;
+    back: for those of the second in the first. An edge of one area inside the other has interior and exterior of its
+    own area on its two sides, both inside the other."""
     both = bits | back
     return (
         (II if both & (II | ALIKE) else 0) | (IE if bits & IE or back & II or both & OPPOSED else 0)
@@ -130,8 +133,9 @@ def _of_areas(bits: int, back: int) -> int:
 
 @called
 def _half(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: FlagArray) -> int:
-    """Return the bits of the edges of one feature to another: all but BE, EI, EB, and those of its ends that meet
-    nothing. is_any: end at the first contact. room: marks on one edge, rows x, y, step. Ends early if flag is set."""
+    """Return the bits that the edges of `own` set in the matrix of two features: all but BE, EI, EB and bits of ends
+    that meet nothing. is_any: end at the first contact. room (n, 3): scratch, the points where one edge is met (x, y,
+    and +1 or -1 where a collinear edge begins or ends). Ends early if flag is set."""
     bits, state, leaves, m = 0, _UNKNOWN, len(their.boxes) // 2, len(their.following)
     for edge in range(len(own.following)):
         if flag[0] != 0:
@@ -189,8 +193,8 @@ def _is_between(a: Point2, b: Point2, p: Point2) -> bool:
 def _contact(
     a: Point2, b: Point2, c: Point2, d: Point2, own: Shape, their: Shape, is_any: bool, room: FloatArray, n: int
 ) -> tuple[int, int]:
-    """Return the bits of the contact of the edges ab and cd, whose boxes meet, and the number of marks on ab, of which
-    there are n before."""
+    """Return the bits that the contact of edge ab of `own` with edge cd of `their` sets (0 if they are disjoint), and
+    the new number of points in `room`, n before (`_half`). Caller guarantees that their boxes meet."""
     c_side, d_side = orient2d(a, b, c), orient2d(a, b, d)
     if c_side * d_side > 0:
         return 0, n
@@ -233,7 +237,8 @@ def _contact(
 
 @called
 def _of_crossing(a: Point2, b: Point2, c: Point2, d: Point2, own: Shape, their: Shape) -> int:
-    """Return the bit of the point where edges of two lines cross. Case: it is an end of a line that touches itself."""
+    """Return the bit set by the point in which edges ab and cd of two lines cross strictly: II, unless an end of either
+    line lies at that point (a line that touches itself)."""
     for k in range(len(own.ends) + len(their.ends)):
         p = as_point2(own.ends, k) if k < len(own.ends) else as_point2(their.ends, k - len(own.ends))
         if _is_between(a, b, p) and _is_between(c, d, p) and orient2d(a, b, p) == 0 and orient2d(c, d, p) == 0:
@@ -248,7 +253,8 @@ def _key(p: Point2, axis_y: bool) -> float:
 
 @called
 def _of_stretches(a: Point2, b: Point2, their: Shape, room: FloatArray, n: int) -> int:
-    """Return the bits of the stretches of the edge ab between its n marks that no collinear edge covers."""
+    """Return the bits (II, IE, LONG) set by the stretches of edge ab between the n points in `room` at which it is met
+    (`_half`), those covered by collinear edges left out."""
     for p in (a, b):
         room[n, 0], room[n, 1], room[n, 2] = p.x, p.y, 0.0
         n += 1
@@ -273,7 +279,7 @@ def _of_stretches(a: Point2, b: Point2, their: Shape, room: FloatArray, n: int) 
 
 @inline
 def _is_end(ends: FloatArray, p: Point2) -> bool:
-    """Return whether p is one of the sorted points."""
+    """Return whether p is among ends (n, 2), sorted lexicographically."""
     low, high = 0, len(ends)
     while low < high:  # bound: halved each turn
         middle = (low + high) // 2
@@ -286,7 +292,7 @@ def _is_end(ends: FloatArray, p: Point2) -> bool:
 
 @called
 def _of_points(own: Shape, their: Shape, is_any: bool, flag: FlagArray) -> int:
-    """Return the bits of points to an area; is_any, flag: as `_half`."""
+    """Return the bits that the points of `own` set with the area `their`. is_any, flag: as in `_half`."""
     bits = 0
     for vertex in range(len(own.following)):
         bits |= _of_location(_locate(as_point2(own.points, vertex), their), is_any)
@@ -297,14 +303,16 @@ def _of_points(own: Shape, their: Shape, is_any: bool, flag: FlagArray) -> int:
 
 @inline
 def _of_location(at: int, is_any: bool) -> int:
-    """Return the bits of a point to an area, as `_locate` has it."""
+    """Return the bits that a point sets with an area. at: its location there, as from `_locate`: 1 inside, 0 on an
+    edge, -1 outside. is_any: only bits of common points."""
     bits = II if at > 0 else IB if at == 0 else 0 if is_any else IE
     return bits if is_any else bits | EI | EB
 
 
 @called
 def _of_ends(own: Shape, their: Shape) -> int:
-    """Return the bits of the boundary points of a line that lie on no edge of the other feature."""
+    """Return the bits BI and BE that the ends of a line set with another feature, where they lie on none of its
+    edges."""
     bits = 0
     for row in range(len(own.ends)):
         at = _locate(as_point2(own.ends, row), their)
@@ -315,7 +323,8 @@ def _of_ends(own: Shape, their: Shape) -> int:
 
 @called
 def _of_paths(own: Shape, their: Shape) -> int:
-    """Return the bits of the paths of a feature that meets no edge of an area."""
+    """Return the bits II and IE that the paths of `own`, none of which meets an edge of the area `their`, set with it:
+    one vertex a path is located."""
     bits = 0
     for edge in range(len(own.following)):
         if own.following[edge] <= edge:
@@ -325,7 +334,8 @@ def _of_paths(own: Shape, their: Shape) -> int:
 
 @inline
 def _passed(p: Point2, c: Point2, d: Point2, at: int) -> int:
-    """Return 0 for a point on the edge cd, else -at if the ray from it to the right crosses the edge, or at."""
+    """Return the updated state of a parity count along the ray from p to the right, once edge cd is considered: 0 if p
+    is on the edge; -at if the ray crosses it; at, the state before (1 odd, -1 even), if not."""
     if (c.x < p.x and d.x < p.x) or (c.y < p.y and d.y < p.y) or (c.y > p.y and d.y > p.y):
         return at
     is_up = d.y > p.y
@@ -337,8 +347,8 @@ def _passed(p: Point2, c: Point2, d: Point2, at: int) -> int:
 
 @called
 def _locate(p: Point2, their: Shape) -> int:
-    """Return 0 for a point on an edge, else 1 if a ray from it to the right crosses an odd number of edges, -1 if an
-    even one."""
+    """Return the location of p in a feature by ray parity: 1 if a ray to the right crosses an odd number of its edges,
+    -1 if an even one, 0 if p lies on an edge."""
     at, leaves, m = -1, len(their.boxes) // 2, len(their.following)
     leaf = next_leaf(their.boxes, 1, p.x, p.y, np.inf, p.y)
     while leaf > 0:  # bound: each leaf once

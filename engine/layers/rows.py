@@ -281,7 +281,7 @@ def _touching(firsts: PolygonSelection, seconds: PolygonSelection, batch: Overla
 
 
 def _is_lost(batch: OverlayBatch) -> BoolArray:
-    """Return for each pair of a batch whether it has common area that rounding collapses."""
+    """Return (n_pairs,) bool: whether a pair of a batch has common area, all of which rounding collapses."""
     return (np.diff(batch.pair_offsets) == 0) & (batch.n_pieces_exact > 0)
 
 
@@ -396,8 +396,8 @@ def locate_points_in_layer(points: PointsLike, layer: Layer, limits: Limits) -> 
 
 
 def with_unmatched(n: int, own: IntArray, others: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return (own, others, places) of sorted pairs (own[k], others[k]), k = places, and of each of n numbers that is in
-    no pair once more with `NONE` for the other and the place, sorted by own."""
+    """Return columns (own, others, places), sorted by own: row k of the sorted pairs (own[k], others[k]) with places =
+    k; and for each of the numbers 0 .. n - 1 that is in no pair one row with `NONE` as other and place."""
     alone = np.setdiff1d(np.arange(n), own)
     none, every = np.full(len(alone), NONE), np.concatenate([own, alone])
     order = np.argsort(every, kind="stable")
@@ -405,6 +405,6 @@ def with_unmatched(n: int, own: IntArray, others: IntArray) -> tuple[IntArray, I
 
 
 def without_areas(left: IntArray, right: IntArray, touching: Touching) -> LayerRows:
-    """Return rows of lines and points alone."""
+    """Return rows that have lines and points alone. left, right (m,): the features of each row; touching: its parts."""
     nothing = np.zeros(1, np.int64)
     return LayerRows(left, right, np.zeros((0, 2)), nothing, nothing, np.zeros(len(left) + 1, np.int64), 0, touching)

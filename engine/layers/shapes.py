@@ -43,7 +43,7 @@ class Paths(NamedTuple):
         return paths, np.repeat(np.arange(len(self.dims)), np.diff(self.path_offsets))[paths]
 
     def of(self, dim: int) -> Paths:
-        """Return those of features of one dimension; other features have none."""
+        """Return a layer of as many features in which those of dimension dim (0 or 1) have their paths, others none."""
         is_own, sizes, counts = self.dims == dim, np.diff(self.offsets), np.diff(self.path_offsets)
         own = np.repeat(is_own, counts)
         vertices = read_only(self.vertices[np.repeat(own, sizes)])
@@ -89,15 +89,15 @@ Shape = namedtuple("Shape", "dim points following ends boxes")
 
 @inline
 def shape_of(shapes: Shapes, k: int) -> Shape:
-    """Return feature k."""
+    """Return feature k of a layer as a `Shape` of views."""
     own, ends = slice(shapes.firsts[k], shapes.firsts[k + 1]), slice(shapes.end_firsts[k], shapes.end_firsts[k + 1])
     boxes = shapes.boxes[shapes.box_firsts[k] : shapes.box_firsts[k + 1] + 1]
     return Shape(shapes.dims[k], shapes.vertices[own], shapes.following[own], shapes.ends[ends], boxes)
 
 
 def shapes_of(layer: MixedLayer, limits: Limits) -> tuple[Shapes, IntArray]:
-    """Return a layer as edges, and the polygons in it whose edges do not only meet in vertices between consecutive
-    ones."""
+    """Return a layer as `Shapes`, and the numbers of polygons that are not simple: their edges meet elsewhere than in
+    vertices between consecutive ones."""
     paths, areas = layer.paths, layer.areas.arrays
     n, dims = len(layer.areas), layer.dims
     vertices, offsets, groups = areas
@@ -151,7 +151,8 @@ def _ends(
 
 @kernel
 def _build_trees(shapes: Shapes, is_simple: BoolArray, flag: FlagArray) -> None:
-    """Fill the boxes of all features; is_simple (n,): made False for polygons, see `shapes_of`."""
+    """Fill ``shapes.boxes`` with the tree of each feature's edges. is_simple (n,): set to False for polygons whose
+    edges meet elsewhere than in vertices between consecutive ones."""
     for k in range(len(shapes.firsts) - 1):
         if flag[0] != 0:
             return

@@ -37,7 +37,8 @@ _FARTHEST: Final = 540.0
 
 
 def steps_of(vertices: FloatArray, ring_offsets: IntArray) -> IntArray:
-    """Return for the edge that begins at each vertex by how many turns the longitudes after it grow: -1, 0 or 1."""
+    """Return (n,) int: for the edge from each vertex to the next of its ring, 1 if it crosses the antimeridian to the
+    east, so that later longitudes are one turn larger, -1 to the west, else 0."""
     x, following = vertices[:, 0], vertices[next_in_rings(ring_offsets), 0]
     with np.errstate(all="ignore"):
         step = following - x
@@ -163,7 +164,8 @@ def _rings(rows: LayerRows, piece: int) -> list[FloatArray]:
 
 
 def _united(pieces: list[tuple[list[FloatArray], bool]], budget: Budget) -> list[list[FloatArray]]:
-    """Return the union of pieces, given with whether they are east of the antimeridian, that meet there alone."""
+    """Return the union of pieces that meet only along the antimeridian, as polygons (lists of rings). pieces: of each
+    its rings, and whether it lies east of the antimeridian."""
     given: dict[tuple[Fraction, Fraction], tuple[float, float]] = {}
     exact = []
     for rings, is_east in pieces:

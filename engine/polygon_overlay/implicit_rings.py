@@ -47,8 +47,8 @@ def areas_of(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray,
     sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray, sums: FloatArray = _NO_SUMS,
 ) -> tuple[FloatArray, int]:  # fmt: skip
-    """Return the areas (n,) of groups of rings by `sum_areas`, NaN where no nearest double is certified, and the number
-    of NaN. Arguments as there."""
+    """Return (n,) the area of each group of rings, NaN where no nearest double is certified, and the number of NaN.
+    Arguments as those of `sum_areas`."""
     areas = np.empty(len(groups) - 1)
     sum_them = entry_of(sum_areas)
     return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas, sums)

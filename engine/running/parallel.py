@@ -253,7 +253,7 @@ class Ranges:
             return first, self._start
 
     def took(self, n_items: int, seconds: float) -> None:
-        """Size the next chunks by the CPU time of one that is done."""
+        """Adapt the size of the next chunks to the CPU time that a chunk of n_items took, in seconds."""
         self._chunk = _next_chunk(n_items, seconds, self._target)
 
 

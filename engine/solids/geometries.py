@@ -48,7 +48,8 @@ def geometries_in(value: Mapping[str, Any], where: Path = (), once: bool = False
 def _walked(
     value: Mapping[str, Any], where: Path, depth: int, walked: dict[int, Any], once: bool
 ) -> Iterator[tuple[Path, Any]]:
-    """Do so. walked: lists of members by id, and at 0 the number of members of those that were there again."""
+    """Do the work of `geometries_in` below the path `where`. depth: of nesting so far. walked: lists of members already
+    walked, by id, and under 0 how many members stood in lists that came again."""
     kind = value.get("type")
     if isinstance(kind, str) and kind in _PLAIN:
         yield where, value

@@ -82,7 +82,8 @@ def _lines_in(geometry: Any) -> Iterator[tuple[Any, bool]]:
 
 
 class _View(NamedTuple):
-    """What of the plane is drawn: pixels are (position - low) * scale, computed with halves, which do not overflow."""
+    """The part of the plane that is drawn: a position becomes the pixel (position - low) * scale, computed from halves,
+    which do not overflow."""
 
     low: FloatArray
     scale: float

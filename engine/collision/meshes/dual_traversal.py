@@ -333,13 +333,15 @@ def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]
 
 @inline
 def pose_number(s: Search, place: Placement, number: int) -> int:
-    """Return the pose number of a body's points as `exact_faces` gives them: UNPOSED where placing rounds nothing."""
+    """Return ``number`` (0 or 1, the row of ``descent.poses`` that moves a body), or UNPOSED if `exact_faces` gives the
+    body's points as placed since placing rounds nothing."""
     return UNPOSED if s.place.error == 0.0 or not place.is_posed else number
 
 
 @called
 def are_parted(s: Search, i: int, j: int, n_stack: int) -> bool:
-    """Return whether the plane of a face separates all faces below nodes i and j. n_stack: pairs on the stack."""
+    """Return whether the plane of some face separates all faces below node i of the first tree from all below node j of
+    the second. n_stack: pairs on the stack of the search, whose free rows are scratch."""
     u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
     v = Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
     free = s.descent.stack[n_stack:]

@@ -292,8 +292,9 @@ def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @inline
 def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: FloatArray) -> bool:
-    """Return whether the open interiors of both bodies intersect, given that face i of the first and face j of the
-    second cross strictly: neither is stacked and one is clean."""
+    """Return whether the strict crossing of face i of the first and face j of the second mesh proves that the open
+    interiors intersect: neither is STATE_STACKED (partly covered by another face of its body), and one is STATE_CLEAN
+    (other faces of its body meet it in common vertices and edges at most). poses: any (n, 12) array, not read."""
     a = state_of(first, i, poses)
     if a == STATE_STACKED:
         return False

@@ -26,8 +26,8 @@ FEW = 4096
 
 
 class Live(NamedTuple):
-    """Of one body: vertices (n,) bool, whether each lies in all planes; faces (m,), those with live corners, in order,
-    and counts (m,), how many corners are live."""
+    """The vertices of one body that lie in all separating planes so far. vertices (n,) bool: which do; faces: the
+    numbers of faces with such a corner, ascending; counts: how many such corners each of these has."""
 
     vertices: Any
     faces: Any
@@ -64,8 +64,9 @@ def _keep_in_plane(poses: FloatArray, plane: Facet, v: Vertices, is_live: BoolAr
 
 @called
 def _keep_in_planes(s: dual.Search, i: int, j: int, own: Live, their: Live) -> bool:
-    """Leave live only vertices in every plane that separates the bodies: planes of face i of the first and face j of
-    the second body, or, if i is negative, of all faces with a live corner. Return whether there is one."""
+    """Clear the vertices that lie off a plane that separates the bodies from ``own.vertices`` and ``their.vertices``;
+    return whether there is such a plane. Planes tried: those of face i of the first and face j of the second body; if i
+    is negative, those of all faces with a live corner."""
     poses, error, is_parted = s.descent.poses, dual.exact_error(s), False
     u = Vertices(s.first.vertices, s.place.a, dual.pose_number(s, s.place.a, 0))
     v = Vertices(s.second.vertices, s.place.b, dual.pose_number(s, s.place.b, 1))
@@ -98,7 +99,7 @@ def _n_live(mesh: MeshArrays, face: int, live: Live) -> int:
 
 @inline
 def _list_faces(mesh: MeshArrays, live: Live) -> int:
-    """Fill the faces with live corners, and return their number."""
+    """Fill ``live.faces`` and ``live.counts`` from ``live.vertices``; return the number of faces listed."""
     n = 0
     for face in range(mesh.faces.shape[0]):
         count = _n_live(mesh, face, live)
@@ -110,7 +111,8 @@ def _list_faces(mesh: MeshArrays, live: Live) -> int:
 
 @inline
 def _strongest_kind(count: int, their_count: int) -> int:
-    """Return the strongest kind of contact of two faces with so many live corners."""
+    """Return the strongest kind of contact that two faces can have of which so many corners lie in the separating
+    plane: of 3 and 3 FACE_FACE, of 3 and 2 EDGE_FACE, ..."""
     more, less = max(count, their_count), min(count, their_count)
     if more == 3:
         return contact.FACE_FACE if less == 3 else (contact.EDGE_FACE if less == 2 else contact.VERTEX_FACE)
@@ -137,7 +139,8 @@ def touches_in_planes(s: dual.Search, is_named: bool, row: IntArray) -> bool:
 
 @called
 def _touches_in_planes(s: dual.Search, is_named: bool, row: IntArray, own: Live, their: Live) -> bool:
-    """Do what `touches_in_planes` says; own, their: scratch, all live."""
+    """Decide a pair for `touches_in_planes`, with its arguments and its result. own, their: scratch, one `Live` a body,
+    on entry with all vertices live."""
     if not _keep_in_planes(s, s.contacts.pairs[0, 0], s.contacts.pairs[0, 1], own, their):
         return False
     if not is_named:

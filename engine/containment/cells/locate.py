@@ -83,8 +83,9 @@ def _look_up_codes(points: Any, cells: Any, undecided: Any, n_undecided: int) ->
 
 @merged
 def _query_lists(points: Any, cells: Any, undecided: Any, n_waiting: Any, locations: Any) -> None:
-    """Write to locations those of the n_waiting UNDECIDED points whose cells have lists, by the parity of crossings
-    from the reference point. undecided: filled by `_look_up_codes`."""
+    """Locate the UNDECIDED points whose cells list triangles: the parity of crossings between the cell's reference
+    point, whose side is known, and the point. undecided: as `_look_up_codes` fills it, n_waiting of them in
+    `waiting`."""
     lattice, groups = cells.lattice, cells.groups
     item_of, code_of, places, waiting = undecided
     for turn in range(min(n_waiting, np.uint64(_AHEAD))):

@@ -275,8 +275,8 @@ def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: 
 def _locate_each(
     points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, stack: Int32Array, flag: FlagArray
 ) -> int:
-    """Do the work of `locate_by_tree` (arguments and result as there), in a function of its own so that the tree's
-    arrays are not reference-counted at each point. stack: scratch."""
+    """Fill locations (n,) int8 for `locate_by_tree`, with its arguments and its result. A function of its own, so that
+    the tree's arrays are not reference-counted at each point. stack: scratch."""
     n_beyond = 0
     for item in range(len(points)):
         if flag[0]:

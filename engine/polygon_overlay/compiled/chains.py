@@ -82,15 +82,16 @@ def origin(chains: Chains, half: int) -> int:
 
 @merged
 def across_end(chains: Chains, half: int) -> int:
-    """Return ``chains.across`` at the node where half-chain ``half`` ends: which chain of the other ring leaves there,
-    and to which side; negative unless that node is simple."""
+    """Return the entry of ``chains.across`` for the node where half-chain ``half`` ends: twice the chain of the other
+    ring that leaves that node, + 1 if it leaves to the left; negative unless the node is simple (one crossing of two
+    rings)."""
     return chains.across[((half ^ 1) + 1) >> 1]
 
 
 @merged
 def to_the_left(across: int, half: int) -> int:
-    """Return the half-chain that leaves a simple node to the left of ``half``, which arrives there. across:
-    `across_end` of ``half``."""
+    """Return the half-chain of the other ring that leaves a simple node to the left of half-chain ``half``, which
+    arrives there. across: `across_end` of ``half``, not negative."""
     return (across & ~1) - 1 + ((across ^ half) & 1)
 
 

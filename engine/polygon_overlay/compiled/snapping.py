@@ -97,9 +97,10 @@ def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> i
 def _find_corners(
     pixels: FloatArray, offsets: IntArray, pieces: IntArray, corners: Int32Array, starts: IntArray, stop: FlagArray
 ) -> int:
-    """Fill ``corners`` with the vertices where snapped rings turn, and ``starts`` with the offsets of rings into them;
-    return the number of corners. FOLDS instead if a ring turns back, no longer begins at its smallest vertex, or rings
-    are no longer in canonical order. pixels: by vertex its integer point; offsets, pieces: of rings and pieces."""
+    """Fill ``corners`` with the vertices at which the snapped rings turn, and ``starts`` with the offsets of rings into
+    them; return the number of corners. FOLDS instead if a ring turns back on itself, no longer begins at its smallest
+    vertex, or rings are no longer in canonical order, and if ``stop`` is set. pixels (n, 2): the integer point of each
+    vertex; offsets: of rings into the vertices; pieces: of pieces, each a shell and its holes, into the rings."""
     piece = n = 0
     for ring in range(offsets.shape[0] - 1):
         first, last = offsets[ring], offsets[ring + 1]
