@@ -7,7 +7,7 @@ the other outside or on it: the interiors are apart, the triangles touch; else t
 a segment or a point without interior. Its edges run along its line both ways, so either side of the line may be the
 outside; two on one line have a common point if their boxes have.
 
-Source: the textbook's exercise 22.4-5; separating axes after S. Gottschalk et al., OBBTree, 1996, in exact signs.
+Source: the textbook's exercise 22.4-5; separating axis test after S. Gottschalk et al., OBBTree, 1996, in exact signs.
 """
 
 from __future__ import annotations

@@ -254,8 +254,10 @@ def nearest_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, points: FloatArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Return (distance, faces, their faces) of two posed boxes or balls as `gap_of_forms` does, and fill points (2, d)
-    with nearest points. First faces -1: the points are not proven."""
+    """Return (distance, faces, their faces) of two posed boxes or balls (`gap_of_forms`), and fill points (2, d) with
+    their nearest points; valid unless the first faces are -1: not proven, or the bodies meet. form: numbers of the
+    first body (`form_relations.py`); turn, move: rotation and translation of its pose; other, their_turn, their_move:
+    those of the second. faces: bit 2 axis + side for each face of the box with the nearest point."""
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:

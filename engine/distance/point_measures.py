@@ -59,13 +59,15 @@ class Measure(Protocol):
     def fill(
         self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
     ) -> int:
-        """Return how many of them integers decided."""
+        """Fill ``answers`` for points start .. stop - 1 of points (n, d), distances only where they are NaN; return how
+        many were decided in integers. limit: if given, a distance is 0.0 where it is at most that, else infinity."""
 
     def order(self, points: FloatArray) -> IntArray | None:
-        """Return an order of points (n, d) in which they are answered sooner, None for as they are."""
+        """Return the order (n,) in which points (n, d) are answered fastest, None for that in which they are given."""
 
     def name(self, codes: IntArray, features: Features) -> None:
-        """Fill the features with codes (n, 2), but for rows whose second code is -1."""
+        """Fill ``features`` from codes (n, 2), which `fill` wrote to the answers; rows whose second code is -1 stay as
+        they are."""
 
 
 class Lines(Preparing):
@@ -84,7 +86,7 @@ class Lines(Preparing):
 
 
 def _spread(solid: Any) -> MeshBody:
-    """Return the triangles of a solid; of lines their edges."""
+    """Return the triangles of a solid as a `MeshBody`; polylines have one triangle, without area, for each edge."""
     if isinstance(solid, Lines):
         corners = np.zeros((len(solid.vertices), 3))
         corners[:, :2] = solid.vertices

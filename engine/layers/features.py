@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from engine.errors import InvalidInputError
+from engine.layers.dissolve import check_gaps, dissolve_mixed
 from engine.layers.feature_rows import Answer, FeatureRows, reporting, with_geometries
-from engine.layers.gaps import check_gaps
 from engine.layers.geojson import EVERY, LINES, Collection, collection_of, mixed_of
 from engine.layers.json_text import text_of
 from engine.layers.limits import Limits
 from engine.layers.members import crs_of, groups_of, members_of, texts_of
-from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
+from engine.layers.path_rows import clip_mixed, overlay_mixed
 from engine.layers.rows import NONE, LayerRows
 from engine.layers.shapes import MixedLayer
 from engine.layers.splits import split_rows

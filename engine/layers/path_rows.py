@@ -9,8 +9,6 @@ merged by rank; pieces that reach the end of a segment are joined with those tha
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,19 +23,16 @@ from engine.layers.rows import (
     LayerRows,
     check_how,
     concatenate_rows,
-    dissolve_rows,
     rows_of_pairs,
     united_pieces,
     without_areas,
 )  # fmt: skip
 from engine.layers.rows import overlay_rows as overlay_areas
-from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, layer_of_areas, no_areas, no_paths, single_points
+from engine.layers.shapes import LINE, POINT, MixedLayer, Paths, layer_of_areas, no_areas, no_paths, single_points
 from engine.layers.wrapping import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
-from engine.polygon_overlay.touching import NOWHERE, Place, Touching, join_edges
-from engine.predicates.orientation import BOUND_2D, GUARD_2D
-from engine.predicates.rational import orient2d_rational
-from engine.running.budget import Budget, polled
+from engine.polygon_overlay.touching import Touching
+from engine.running.budget import Budget
 from engine.scenes.clip import loose_pieces, sorted_exactly
 from engine.scenes.ends import LoosePieces, merge_parts, take_pieces
 from engine.scenes.scene import Scene
@@ -73,9 +68,10 @@ def overlay_mixed(
     of_pairs, of_left, _ = HOWS[how]
     parts = [areas]
     if of_pairs:
-        parts.append(path_rows(left.paths, right.areas, np.arange(len(right.areas)), False, limits, kinds))
+        parts.append(path_rows(left.paths, right.areas, np.arange(len(right.areas)), None, limits, kinds))
     if of_left:
-        parts.append(path_rows(left.paths, right.areas, np.zeros(len(right.areas), np.int64), True, limits, kinds))
+        keys, outside = (np.zeros(len(each), np.int64) for each in (right.areas, left.areas))
+        parts.append(path_rows(left.paths, right.areas, keys, outside, limits, kinds))
     return joined_rows(sorted_rows(parts), limits)
 
 
@@ -94,7 +90,7 @@ def clip_mixed(
     parts = _clip_areas(layer, mask.prepared["union"], limits, with_touching)
     if (layer.paths.dims >= 0).any():
         zeros = np.zeros(len(mask.areas), np.int64)
-        parts.append(path_rows(layer.paths, mask.areas, zeros, False, limits, kinds))
+        parts.append(path_rows(layer.paths, mask.areas, zeros, None, limits, kinds))
     return joined_rows(sorted_rows(parts), limits)
 
 
@@ -143,16 +139,14 @@ def sorted_rows(parts: list[LayerRows]) -> LayerRows:
 
 
 def path_rows(
-    paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits, kinds: frozenset[int]
+    paths: Paths, areas: Layer, keys: IntArray, outside: IntArray | None, limits: Limits, kinds: frozenset[int]
 ) -> LayerRows:
     """Return a row for each feature of points or lines and each key, with the parts of the feature in the polygons that
-    have that key; is_outside: rows of the parts that are in no polygon. keys: by polygon a number; polygons of one
-    number are one region. kinds: dimensions of parts that stay."""
+    have that key. keys: by polygon a number; polygons of one number are one region. outside: None; or by feature a key:
+    a row for each feature, with its parts in no polygon of that key. kinds: dimensions of parts that stay."""
     kinds_of = {POINT: _of_points, LINE: _of_lines}
     made = [
-        parts_of(paths, areas, keys, is_outside, limits)
-        for dim, parts_of in kinds_of.items()
-        if (paths.dims == dim).any()
+        parts_of(paths, areas, keys, outside, limits) for dim, parts_of in kinds_of.items() if (paths.dims == dim).any()
     ]
     pairs = np.concatenate([each[0] for each in made])
     sizes = np.concatenate([np.diff(each[1].offsets) for each in made])
@@ -167,7 +161,7 @@ def path_rows(
         owners[lines], vertices[places_of(offsets, lines)], summed(sizes[lines]), owners[points],
         vertices[offsets[points]],
     )  # fmt: skip
-    return without_areas(names[:, 0], np.full(len(names), NONE) if is_outside else names[:, 1], touching)
+    return without_areas(names[:, 0], names[:, 1] if outside is None else np.full(len(names), NONE), touching)
 
 
 def _unique(first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
@@ -185,15 +179,17 @@ class _Parts(NamedTuple):
     offsets: IntArray
 
 
-def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
+def _of_points(
+    paths: Paths, areas: Layer, keys: IntArray, outside: IntArray | None, limits: Limits
+) -> tuple[IntArray, _Parts]:
     """Return (m, 2) rows (feature, key), and as `_Parts` the points that a layer's point features have in the polygons
-    with that key. keys: by polygon. is_outside: the points in no polygon instead, with key 0."""
+    with that key. keys: by polygon. outside: as in `path_rows`; the key of a row is 0 then."""
     paths = paths.of(POINT)
     vertices, features = paths.vertices, paths.owners()[1]
     points, polygons = single_points(vertices), MixedLayer(areas, no_paths(len(areas)))
     first, second = related_pairs(points, polygons, "intersects", 0.0, limits).T
-    if is_outside:
-        first = np.setdiff1d(np.arange(len(vertices)), first)
+    if outside is not None:
+        first = np.setdiff1d(np.arange(len(vertices)), first[keys[second] == outside[features[first]]])
         units = np.column_stack([first, np.zeros(len(first), np.int64)])
     else:
         units = _unique(first, keys[second])[0]
@@ -201,9 +197,11 @@ def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, lim
     return pairs, _Parts(vertices[units[:, 0]], np.arange(len(units) + 1))
 
 
-def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
+def _of_lines(
+    paths: Paths, areas: Layer, keys: IntArray, outside: IntArray | None, limits: Limits
+) -> tuple[IntArray, _Parts]:
     """Return (m, 2) rows (feature, key), and as `_Parts` the lines that a layer's line features have in the polygons
-    with that key. keys: by polygon. is_outside: what is in no polygon instead, with key 0."""
+    with that key. keys: by polygon. outside: as in `path_rows`; the key of a row is 0 then."""
     path, features = paths.owners()
     firsts = np.flatnonzero((path[:-1] == path[1:]) & (paths.dims[features[:-1]] == LINE))
     segments = read_only(np.stack([paths.vertices[firsts], paths.vertices[firsts + 1]], axis=1))
@@ -217,13 +215,16 @@ def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limi
             pieces = loose_pieces(segments, scene._placements, budget, limits.workers)
         else:
             pieces = merge_parts([], 2)
+        if outside is not None:
+            is_own = owners[pieces.body] == outside[features[firsts[pieces.source]]]
+            pieces = take_pieces(pieces, np.flatnonzero(is_own))
         if len(np.unique(owners)) == len(owners):  # each polygon alone: its pieces are apart
             order = np.lexsort((pieces.t[:, 0], owners[pieces.body], pieces.source))
             ends, own = pieces.ends[:, order], (pieces.faces[order] < 0).T
             merged = _Intervals(owners[pieces.body[order]], pieces.source[order], ends, own)
         else:
             merged = _merged(owners, _ranked(pieces, segments, solids, scene, budget, limits.workers))
-    if is_outside:
+    if outside is not None:
         merged = _between(merged, segments)
     order = np.lexsort((merged.segment, merged.key, features[firsts[merged.segment]]))  # stable: along a segment too
     merged = _Intervals(merged.key[order], merged.segment[order], merged.ends[:, order], merged.own[:, order])
@@ -330,113 +331,3 @@ def _between(inside: _Intervals, segments: FloatArray) -> _Intervals:
     segment = np.concatenate([every, inside.segment])[begins][is_gap]
     made = np.stack([starts, ends])[:, is_gap], np.stack(is_own)[:, is_gap]
     return _Intervals(np.zeros(len(segment), np.int64), segment, *made)
-
-
-def dissolve_mixed(
-    layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False, gaps: str = "keep"
-) -> LayerRows:
-    """Return one row for each group, the union of its features: of lines what is outside of its polygons, of points
-    those on neither; is_coverage, gaps: as `dissolve_rows`."""
-    if AREA in layer.kinds or not layer.kinds:
-        rows = dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage, gaps)
-    else:
-        rows = without_areas(np.arange(n_groups), np.full(n_groups, NONE), NOWHERE)
-    if layer.kinds - {AREA}:
-        lines, points = _dissolve_lines(layer, groups, n_groups, limits), _dissolve_points(layer, groups, limits)
-        rows = replace(rows, touching=Touching(*lines, *points))
-    return joined_rows(rows, limits)
-
-
-def _dissolve_points(layer: MixedLayer, groups: IntArray, limits: Limits) -> tuple[IntArray, FloatArray]:
-    """Return group and place of the points that are on no line or polygon of their group, each once, sorted."""
-    points, others = layer.paths.of(POINT), MixedLayer(layer.areas, layer.paths.of(LINE))
-    own = groups[points.owners()[1]]
-    if not len(own):
-        return own, points.vertices
-    covered, by = related_pairs(single_points(points.vertices), others, "intersects", 0.0, limits).T
-    stays = own != NONE
-    stays[covered[own[covered] == groups[by]]] = False
-    made = np.unique(np.column_stack([own, points.vertices])[stays], axis=0)
-    return made[:, 0].astype(np.int64), made[:, 1:]
-
-
-def _dissolve_lines(
-    layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return the group of each line, their vertices and offsets, of the unions of lines: stretches that lie on one
-    another once, outside of the polygons of the group. Lines that cross get no vertex there, which rounding would put
-    beside them."""
-    paths = layer.paths.of(LINE)
-    path, features = paths.owners()
-    tails = np.flatnonzero((path[:-1] == path[1:]) & (groups[features[:-1]] != NONE))
-    ends = np.stack([paths.vertices[tails], paths.vertices[tails + 1]], axis=1)
-    turned = (ends[:, 0, 0] > ends[:, 1, 0]) | ((ends[:, 0, 0] == ends[:, 1, 0]) & (ends[:, 0, 1] > ends[:, 1, 1]))
-    ends[turned] = ends[turned, ::-1]
-    rows = np.unique(np.column_stack([groups[features[tails]], ends.reshape(-1, 4)]), axis=0)
-    rows = rows[(rows[:, 1:3] != rows[:, 3:]).any(axis=1)]
-    filled = np.flatnonzero(layer.areas.arrays.sizes())
-    (order, firsts), (areas, area_firsts) = (_by_group(each, n_groups) for each in (rows[:, 0], groups[filled]))
-    edges = [((a, b), (c, d)) for _, a, b, c, d in polled(rows.tolist())]
-    cuts = _cuts(edges, rows, limits)
-    lines: list[tuple[int, FloatArray]] = []
-    with limits.budget():
-        for group in polled(np.flatnonzero(np.diff(firsts)).tolist()):
-            own = order[firsts[group] : firsts[group + 1]].tolist()
-            parts = {part for k in own for part in pairwise(sorted({*edges[k], *cuts.get(k, ())}))}
-            made = [*map(np.array, join_edges(sorted(parts)))]
-            members = filled[areas[area_firsts[group] : area_firsts[group + 1]]]
-            lines += [(group, line) for line in _outside(made, layer.areas, members, limits)]
-    vertices = np.concatenate([np.zeros((0, 2)), *(line for _, line in lines)])
-    return np.array([group for group, _ in lines], np.int64), vertices, summed([len(line) for _, line in lines])
-
-
-def _by_group(groups: IntArray, n_groups: int) -> tuple[IntArray, IntArray]:
-    """Return the items of each group in order, and the offsets of groups in these. groups: by item, -1 for none."""
-    order = np.argsort(groups, kind="stable")
-    return order, np.searchsorted(groups[order], np.arange(n_groups + 1))
-
-
-def _outside(lines: list[FloatArray], areas: Layer, members: IntArray, limits: Limits) -> list[FloatArray]:
-    """Return the parts of lines outside of some polygons."""
-    if not len(members):
-        return lines
-    offsets = summed([*map(len, lines)])
-    paths = Paths(np.array([LINE], np.int8), read_only(np.concatenate(lines)), offsets, np.array([0, len(lines)]))
-    some = layer_of_areas(areas.arrays.take(members))
-    made = path_rows(paths, some.areas, np.zeros(len(members), np.int64), True, limits, frozenset([LINE])).touching
-    return np.split(made.vertices, made.offsets[1:-1]) if len(made.lines) else []
-
-
-def _cuts(edges: list[tuple[Place, Place]], rows: FloatArray, limits: Limits) -> dict[int, set[Place]]:
-    """Return the points at which edges, sorted pairs of points, are split: where an end of another one of the group
-    lies on one that is collinear. rows (n, 5): group, ends."""
-    own, ends, cuts = rows[:, 0], rows[:, 1:].reshape(-1, 2, 2), dict[int, set[Place]]()
-    if not len(rows):
-        return cuts
-    start, size = ends.min(axis=(0, 1)), (ends.max(axis=(0, 1)) / 2 - ends.min(axis=(0, 1)) / 2)
-    at = (ends / 2 - start / 2) / np.where(size > 0.0, size, 1.0)  # in 0 .. 1; groups side by side
-    at[:, :, 0] += 2.0 * own[:, None]
-    slack = 2.0**-48 * (2.0 + at.max())
-    low, high = at.min(axis=1) - slack, at.max(axis=1) + slack
-
-    def may_overlap(pairs: IntArray) -> BoolArray:
-        return (own[pairs[:, 0]] == own[pairs[:, 1]]) & _may_be_collinear(ends, pairs)
-
-    with limits.budget():
-        for i, j in polled(limits.pairs_of_boxes(low, high, may_overlap).tolist()):
-            (a, b), (c, d) = edges[i], edges[j]
-            if max(a, c) < min(b, d) and orient2d_rational(a, b, c) == orient2d_rational(a, b, d) == 0:
-                cuts.setdefault(i, set()).update(p for p in (c, d) if a < p < b)
-                cuts.setdefault(j, set()).update(p for p in (a, b) if c < p < d)
-    return cuts
-
-
-def _may_be_collinear(rows: FloatArray, pairs: IntArray) -> BoolArray:
-    """Return for pairs of edges False where doubles prove that an end of the second is beside the line of the first."""
-    (a, b), (c, d) = (rows[pairs[:, k]].transpose(1, 0, 2) for k in range(2))
-    result = np.ones(len(pairs), np.bool_)
-    with np.errstate(all="ignore"):
-        for p in (c, d):
-            left, right = (a - p)[:, 0] * (b - p)[:, 1], (a - p)[:, 1] * (b - p)[:, 0]
-            result &= ~(np.abs(left - right) > BOUND_2D * (np.abs(left) + np.abs(right)) + GUARD_2D)
-    return result

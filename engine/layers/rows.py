@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, Final, cast
 
 import numpy as np
 
-from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
-from engine.layers.gaps import Place, gaps_of, report_gaps
+from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.layers.limits import Limits
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
-from engine.polygon_overlay.coverage import union_of_coverage
 from engine.polygon_overlay.overlay import less_all, overlay, union_all
 from engine.polygon_overlay.pair_arrays import (
     PolygonArrays,
@@ -192,7 +189,7 @@ def _groups_overlap(others: Layer, rivals: IntArray, groups: IntArray, seconds: 
     """Return for each group k (n_groups,) whether two of its features, seconds[groups[k]:groups[k + 1]] of `others`,
     have common area. groups: offsets; rivals: pairs of `others` whose boxes intersect."""
     has_overlap = np.zeros(len(groups) - 1, np.bool_)
-    clashes = rivals[_pairs_overlap(others.arrays, rivals, limits)]
+    clashes = rivals[pairs_overlap(others.arrays, rivals, limits)]
     rivals_of: dict[int, set[int]] = {}
     for first, second in clashes.tolist():
         rivals_of.setdefault(first, set()).add(second)
@@ -202,7 +199,7 @@ def _groups_overlap(others: Layer, rivals: IntArray, groups: IntArray, seconds: 
     return has_overlap
 
 
-def _pairs_overlap(arrays: PolygonArrays, pairs: IntArray, limits: Limits) -> BoolArray:
+def pairs_overlap(arrays: PolygonArrays, pairs: IntArray, limits: Limits) -> BoolArray:
     """Return for each pair of polygons whether they have common area."""
     sides = PolygonSelection(arrays, pairs[:, 0]), PolygonSelection(arrays, pairs[:, 1])
     return _overlay_batch(*sides, "intersection", limits).n_pieces_exact > 0
@@ -230,7 +227,7 @@ def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, lim
     low, high = parts.boxes(several)
     of = owner[several]
     pairs = several[limits.pairs_of_boxes(low, high, lambda pairs: of[pairs[:, 0]] == of[pairs[:, 1]])]
-    overlapping = np.unique(owner[pairs[_pairs_overlap(parts, pairs, limits), 0]])
+    overlapping = np.unique(owner[pairs[pairs_overlap(parts, pairs, limits), 0]])
     if len(overlapping):
         those = [
             unite(PolygonSelection(parts, np.arange(offsets[k], offsets[k + 1])), limits) for k in overlapping.tolist()
@@ -320,46 +317,6 @@ def concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
         concatenate_offsets([part.row_offsets for part in parts]),
         sum(part.n_collapsed for part in parts), concatenate_touching(touching),
     )  # fmt: skip
-
-
-def dissolve_rows(
-    layer: Layer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False, gaps: str = "keep"
-) -> LayerRows:
-    """Return one row for each group, the union of its features; groups: group of each feature, -1 for none.
-    is_coverage: features of a group must not overlap; gaps: keep, or refuse holes that several of them enclose."""
-    order = np.argsort(groups, kind="stable")
-    ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
-    if is_coverage:
-        parts, places = [], list[Place]()
-        for start, stop in pairwise(ends):
-            some = order[start:stop]
-            parts.append(_joined_coverage(layer, some, limits))
-            with limits.budget():
-                places += gaps_of(parts[-1], layer.arrays.take(some)) if limits.grid is None else []
-        with limits.budget():
-            report_gaps(places, gaps == "refuse")
-        return rows_of(parts, np.arange(n_groups))
-    members = (list(PolygonSelection(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
-    unions = [limits.record(union_all(some, grid=limits.grid, **limits.options())) for some in members]
-    return rows_of(unions, np.arange(n_groups))
-
-
-def _joined_coverage(layer: Layer, members: IntArray, limits: Limits) -> Overlay:
-    """Return the union of features that do not overlap. Raises: InvalidInputError that names two that do."""
-    members = members[layer.arrays.sizes()[members] > 0]
-    some = layer.arrays.take(members)
-    with limits.budget() as budget:
-        made = union_of_coverage(some, budget, is_claimed=True) if len(members) and limits.grid is None else None
-    if made is not None:
-        return made[0]
-    pairs = limits.pairs_of_boxes(*some.boxes(np.arange(len(members))))
-    if len(clash := np.flatnonzero(_pairs_overlap(some, pairs, limits))):
-        i, j = pairs[clash[0]].tolist()
-        x, y = overlay(some.polygon(i), some.polygon(j), "intersection").vertices[0].tolist()
-        what = f"features {members[i]} and {members[j]} overlap at ({x!r}, {y!r})"
-        raise InvalidInputError(f"coverage: {what}; correct them, or leave coverage out", ("coverage",))
-    polygons = list(PolygonSelection(some, np.arange(len(members))))
-    return cast(Overlay, limits.record(union_all(polygons, grid=limits.grid, **limits.options())))
 
 
 def rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:

@@ -166,9 +166,10 @@ def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool
 
 @inline
 def in_ball(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return 1 if a segment meets a posed ball, -1 if not, or UNDECIDED; and both ends (t, t_low, slack, face) of the
-    piece, not computed if is_any. body: row (4,) of a `Table`. d = q - p, and f = p - c for the centre c, off by the
-    rounding of the posed c."""
+    """Return whether segment segments[item], of (n, 2, d), meets a posed ball: 1, -1 (not) or UNDECIDED; and both ends
+    of its piece, each (t, t_low, slack, face). With is_any, or unless the first is 1, the ends are the segment's own.
+    body: row (4,) of a `Table`, whose third number is the address of the ball's posed centre, as double-doubles, and
+    radius. The rounding of that centre is within the bounds used."""
     c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     along = difference(p, q)

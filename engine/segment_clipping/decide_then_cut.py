@@ -183,7 +183,8 @@ class _Batch:
                     self._fill(*block)
 
     def fill_rest(self, first: int, last: int) -> None:
-        """Fill as many of the blocks that wait as the range has numbers; all blocks are decided."""
+        """Fill the next last - first of the waiting blocks, in order, as a task of `run_chunks`, of whose ranges only
+        the lengths count. Called once all blocks are decided."""
         for _ in range(first, last):
             if (block := self._next_to_fill()) is not None:
                 self._fill(*block)

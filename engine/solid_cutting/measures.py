@@ -252,7 +252,8 @@ def _of_mesh(solid: Polyhedron, budget: Budget, what: str) -> tuple[Any, bool]:
 
 
 def _is_scaled(result: Any, exponent: int) -> bool:
-    """Return whether scaling back by 2^exponent rounded nothing."""
+    """Return whether `result`, already multiplied by 2^exponent, is proven not to have been rounded by that: the
+    exponent is 0, or all its numbers are normal and finite (a zero may have underflowed: False)."""
     sizes = np.abs(result)
     return bool(exponent == 0 or ((sizes > SMALLEST_NORMAL) & (sizes < np.inf)).all())
 

@@ -46,7 +46,8 @@ _POLL: Final = 0x3FFF
 def cross_of(
     uh: float, ul: float, vh: float, vl: float, sh: float, sl: float, th: float, tl: float
 ) -> tuple[float, float, float]:
-    """Return (h, l, size): u v - s t of exact pairs as a double-double, and the size of its products."""
+    """Return (h, l, size): u v - s t as a double-double h + l, and size = |u v| + |s t|, to which its error is relative
+    (`bound_of`). Each factor is an exact sum of two doubles: u = uh + ul, likewise v, s and t."""
     p, p_low = two_prod(uh, vh)
     q, q_low = two_prod(sh, th)
     h, low = two_diff(p, q)
@@ -57,7 +58,8 @@ def cross_of(
 
 @inline
 def _minor(vertices: FloatArray, a: int, b: int, c: int, x: int, y: int) -> tuple[float, float, float]:
-    """Return (h, l, size): (b - a) x (c - a) on the axes x and y as a double-double, and the size of its products."""
+    """Return (h, l, size): (b - a) x (c - a) in the projection on axes x and y, as `cross_of` gives it. a, b, c:
+    vertices."""
     uh, ul = two_diff(vertices[b, x], vertices[a, x])
     vh, vl = two_diff(vertices[c, y], vertices[a, y])
     sh, sl = two_diff(vertices[b, y], vertices[a, y])
