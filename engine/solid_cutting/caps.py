@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cmp_to_key
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from engine.solid_cutting.shells import matched
 from engine.types import FloatArray, IntArray, read_only
 
 Ring = list[int]
+_MOST_STEPS: Final = 12
+"""How far ears are clipped again around one that is turned: beyond, all are."""
 
 
 class Seen(NamedTuple):
@@ -272,53 +274,64 @@ class _TurnedError(Exception):
 
 
 def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntArray:
-    """Return the triangles (n, 3) of a polygon, checked exactly; is_exact: made with fractions. Raises _TurnedError, or
-    TooComplexError where there is nothing left to try."""
+    """Return the triangles (n, 3) of a polygon, checked exactly; is_exact: made with fractions where floats fail.
+    Raises: _TurnedError, or TooComplexError where there is nothing left to try."""
+    ring = _joined(view, area, is_exact, budget)
+    corners, places = np.array(ring, np.int64), view.doubles(ring)
+    span = float(np.ptp(places, axis=0).max())
+    slack = 2.0**-49 * (view.points.size + span) * span  # positions are off by 2^-53 of the largest coordinate
+    made: IntArray | None = _ears_of(np.ascontiguousarray(places.T), slack, budget)
+    if made is not None and (turned := _turned_in(view, corners[made], budget)):
+        made = _clipped_again(view, ring, made.tolist(), turned, budget)
+    if made is None and is_exact:
+        made = _ears_of([*zip(*map(view.exact, ring))], 0, budget)
+        made = None if made is None or _turned_in(view, corners[made], budget) else made
+    if made is None:
+        raise _failed(view, area, is_exact)
+    return corners[made]
+
+
+def _joined(view: Seen, area: Area, is_exact: bool, budget: Budget) -> Ring:
+    """Return the rings of a polygon as one, with holes joined by bridges there and back."""
+    if not area.holes:
+        return area.shell
     rings = [area.shell, *area.holes]
     if is_exact:
         firsts = [min(range(len(ring)), key=lambda k: view.exact(ring[k])) for ring in rings]
         rings = [ring[k:] + ring[:k] for ring, k in zip(rings, firsts)]
-    numbers = [number for ring in rings for number in ring]
-    n = len(numbers) + 2 * len(area.holes)
-    x: Any
-    y: Any
-    x, y = np.ascontiguousarray(view.doubles(numbers).T)
-    before, after, starts = np.empty(n, np.int64), np.empty(n, np.int64), np.cumsum([0, *map(len, rings)])
-    for start, stop in zip(starts[:-1].tolist(), starts[1:].tolist()):
-        after[start:stop], before[start:stop] = np.arange(start + 1, stop + 1), np.arange(start - 1, stop - 1)
-        after[stop - 1], before[start] = start, stop - 1
-    bridge: Any = entry_of(bridge_of)
-    clip: Any = entry_of(clip_ears)
-    if is_exact:
-        x, y = (list(axis) for axis in zip(*map(view.exact, numbers)))
-        bridge, clip = (getattr(each, "py_func", each) for each in (bridge_of, clip_ears))
-    order = sorted(range(1, len(rings)), key=lambda k: (x[starts[k]], y[starts[k]]))
-    if order:
-        x, y = ([*axis, *[axis[0]] * (n - len(axis))] for axis in (x, y))
-        x, y = (x, y) if is_exact else (np.array(x), np.array(y))
-    end = len(numbers)
-    for hole in (int(starts[k]) for k in order):
+    numbers, ends = [number for ring in rings for number in ring], np.cumsum([*map(len, rings)]).tolist()
+    places = [*map(view.exact, numbers)] if is_exact else view.doubles(numbers).tolist()
+    starts = sorted((start for start in ends[:-1]), key=places.__getitem__)
+    numbers, places = ([*each, *[each[0]] * (2 * len(starts))] for each in (numbers, places))
+    x, y = (list(axis) if is_exact else np.array(axis) for axis in zip(*places))
+    before, after = (np.arange(len(numbers)) + step for step in (-1, 1))
+    before[[0, *ends[:-1]]], after[np.array(ends) - 1] = np.array(ends) - 1, [0, *ends[:-1]]
+    bridge: Any = getattr(bridge_of, "py_func", bridge_of) if is_exact else entry_of(bridge_of)
+    for end, hole in zip(range(ends[-1], len(numbers), 2), starts):
         budget.check()
         at = bridge(x, y, before, after, 0, hole)
         if at < 0:
             raise _failed(view, area, is_exact)
-        x[end], y[end], x[end + 1], y[end + 1] = x[at], y[at], x[hole], y[hole]
-        numbers += [numbers[at], numbers[hole]]
+        for copy, corner in ((end, at), (end + 1, hole)):
+            x[copy], y[copy], numbers[copy] = x[corner], y[corner], numbers[corner]
         following, last = after[at], before[hole]
         after[at], before[hole], after[end], before[following] = hole, at, following, end
         after[end + 1], before[end], after[last], before[end + 1] = end, end + 1, end + 1, last
-        end += 2
-    ears = np.empty((n - 2, 3), np.int64)
-    scratch = np.empty(n, np.int64), np.zeros(n, np.bool_)
-    n_ears = clip(x, y, before, after, 0, n, *scratch, ears, budget.flag)
+    ring = [0]
+    while len(ring) < len(numbers):
+        ring.append(int(after[ring[-1]]))
+    return [numbers[corner] for corner in ring]
+
+
+def _ears_of(places: Any, slack: float, budget: Budget) -> IntArray | None:
+    """Return the triangles (n - 2, 3) of a ring of n corners, in floats or fractions; None where ears run out."""
+    (x, y), n = places, len(places[0])
+    before, after, ears = np.arange(-1, n - 1), np.arange(1, n + 1), np.empty((n - 2, 3), np.int64)
+    before[0], after[-1] = n - 1, 0
+    clip: Any = entry_of(clip_ears) if isinstance(x, np.ndarray) else getattr(clip_ears, "py_func", clip_ears)
+    n_ears = clip(x, y, before, after, 0, n, np.empty(n, np.int64), np.zeros(n, np.bool_), slack, ears, budget.flag)
     budget.check()
-    triangles = np.array(numbers, np.int64)[ears[:n_ears]]
-    made = triangles if n_ears == n - 2 else None
-    if made is not None and (turned := _turned_in(view, made, budget)):
-        made = _flipped(view, made, turned, budget)
-    if made is None:
-        raise _failed(view, area, is_exact)
-    return made
+    return ears if n_ears == n - 2 else None
 
 
 def _failed(view: Seen, area: Area, is_exact: bool) -> Exception:
@@ -345,23 +358,29 @@ def _turned_in(view: Seen, triangles: IntArray, budget: Budget) -> list[int]:
     return turned
 
 
-def _flipped(view: Seen, triangles: IntArray, turned: list[int], budget: Budget) -> IntArray | None:
-    """Return triangles with edges of those that are clockwise flipped, so that none is; None where that fails: floats
-    made them of points that are nearly on a line."""
-    rows = triangles.tolist()
-    across = {(row[k], row[k - 2]): number for number, row in enumerate(rows) for k in range(3)}
+def _clipped_again(view: Seen, ring: Ring, rows: list[Ring], turned: list[int], budget: Budget) -> IntArray | None:
+    """Return the triangles of a ring, rows of its corners, with ears around those that are clockwise clipped again, by
+    fractions, so that none is; None where that fails. Floats made them of points that are close together.
+
+    Triangles of one ring that hang together by edges are a polygon.
+    """
+    at = {(row[k - 1], row[k]): number for number, row in enumerate(rows) for k in range(3)}
     for number in turned:
-        budget.check()
-        for k in range(3):
-            a, b, c = rows[number][k], rows[number][k - 2], rows[number][k - 1]
-            other = across.get((b, a), -1)
-            if other < 0 or not {a, b} <= {*rows[other]} or c in rows[other]:
-                continue
-            d = sum(rows[other]) - a - b
-            if view.turn(a, d, c) >= 0 and view.turn(d, b, c) >= 0:
-                rows[number], rows[other] = [a, d, c], [d, b, c]
-                across |= {(a, d): number, (d, c): number, (c, a): number, (d, b): other, (b, c): other, (c, d): other}
+        region = {number}
+        for _ in range(_MOST_STEPS):
+            sides = {(rows[each][k - 1], rows[each][k]) for each in region for k in range(3)}
+            after = {u: v for u, v in sides if (v, u) not in sides}
+            corners = [rows[number][0]]
+            while after[corners[-1]] != corners[0]:  # bound: the corners of the region
+                corners.append(after[corners[-1]])
+            ears = _ears_of([*zip(*(view.exact(ring[corner]) for corner in corners))], 0, budget)
+            made = [] if ears is None else [[corners[k] for k in ear] for ear in ears.tolist()]
+            if made and all(view.turn(*(ring[corner] for corner in row)) >= 0 for row in made):
                 break
+            region |= {at[v, u] for u, v in sides if (v, u) in at}
         else:
             return None
+        for each, row in zip(region, made):
+            rows[each] = row
+            at |= {(row[k - 1], row[k]): each for k in range(3)}
     return np.array(rows, np.int64)

@@ -3,9 +3,11 @@
 Holes are joined to the shell by bridges, from the leftmost on. An ear is a left turn whose closed triangle holds no
 other blunt corner, but such as lie at the same place as one of its corners; at the place of the tip no side may enter.
 
-On floats nothing is decided for good. Triangles that have the rings as their boundary, all counter-clockwise or flat
-for the exact points, cover each point as often as the rings wind around it: once inside, never outside. So the caller
-checks each triangle exactly, and calls again with fractions where one is turned, or the ears run out.
+On floats nothing is decided for good. Turns within `slack` count as straight, so that corners along what was one edge
+are joined to others across it, not to each other, and points within it of an ear as in it. Triangles that have the
+rings as their boundary, all counter-clockwise or flat for the exact points, cover each point as often as the rings wind
+around it: once inside, never outside. So the caller checks each triangle exactly, and calls again with fractions around
+one that is turned, or for all where the ears run out.
 
 Source: D. Eberly, Triangulation by ear clipping, 2002; Mapbox, earcut, 2015 (the bridge of a hole).
 """
@@ -90,14 +92,15 @@ def bridge_of(x: Numbers, y: Numbers, before: IntArray, after: IntArray, start: 
 @kernel
 def clip_ears(
     x: Numbers, y: Numbers, before: IntArray, after: IntArray, start: int, size: int, blunt: IntArray,
-    is_blunt: BoolArray, ears: IntArray, flag: FlagArray,
+    is_blunt: BoolArray, slack: Any, ears: IntArray, flag: FlagArray,
 ) -> int:  # fmt: skip
     """Write the triangles of the ring through `start`, of `size` corners, to ears (size - 2, 3); return how many.
-    blunt, is_blunt: scratch, by corner. before, after: neighbours by corner, changed."""
+    blunt, is_blunt: scratch, by corner. before, after: neighbours by corner, changed. slack: a bound on the error of
+    turns, 0 for fractions."""
     n_ears, n_blunt, p = 0, 0, start
     for _ in range(size):
         a, c = before[p], after[p]
-        is_blunt[p] = (x[p] - x[a]) * (y[c] - y[a]) - (y[p] - y[a]) * (x[c] - x[a]) <= 0
+        is_blunt[p] = (x[p] - x[a]) * (y[c] - y[a]) - (y[p] - y[a]) * (x[c] - x[a]) <= slack
         if is_blunt[p]:
             blunt[n_blunt] = p
             n_blunt += 1
@@ -109,10 +112,11 @@ def clip_ears(
         a, c = before[p], after[p]
         ax, ay, bx, by, cx, cy = x[a], y[a], x[p], y[p], x[c], y[c]
         turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        is_ear = turn > 0 or (turn == 0 and n_missed > size - n_ears) or size - n_ears == 3
+        is_left, is_forced = turn > slack, n_missed > size - n_ears
+        is_ear = is_left or (turn >= -slack and is_forced) or size - n_ears == 3
         low_x, high_x, low_y, high_y = min(ax, bx, cx), max(ax, bx, cx), min(ay, by, cy), max(ay, by, cy)
         place, n_left = 0, 0
-        while turn > 0 and is_ear and place < n_blunt:
+        while is_left and is_ear and place < n_blunt:
             k = blunt[place]
             place += 1
             if not is_blunt[k]:
@@ -122,15 +126,20 @@ def clip_ears(
             kx, ky = x[k], y[k]
             if kx < low_x or kx > high_x or ky < low_y or ky > high_y or k in (a, c):
                 continue
-            if (bx - ax) * (ky - ay) < (by - ay) * (kx - ax) or (cx - bx) * (ky - by) < (cy - by) * (kx - bx):
+            if (kx == ax and ky == ay) or (kx == cx and ky == cy):
                 continue
-            if (ax - cx) * (ky - cy) < (ay - cy) * (kx - cx) or (kx == ax and ky == ay) or (kx == cx and ky == cy):
+            sides = (
+                (bx - ax) * (ky - ay) - (by - ay) * (kx - ax),
+                (cx - bx) * (ky - by) - (cy - by) * (kx - bx),
+                (ax - cx) * (ky - cy) - (ay - cy) * (kx - cx),
+            )
+            if min(sides) < -slack:
                 continue
             is_ear, n_between = kx == bx and ky == by, 0
             for q in (before[k], after[k]):
                 first = (bx - ax) * (y[q] - ay) - (by - ay) * (x[q] - ax)
                 second = (cx - bx) * (y[q] - by) - (cy - by) * (x[q] - bx)
-                n_between += 2 if first > 0 and second > 0 else 1 if first >= 0 and second >= 0 else 0
+                n_between += 2 if min(first, second) > slack else 1 if min(first, second) >= -slack else 0
             is_ear = is_ear and n_between < 2  # case: a side enters there, or both lie along the ear
         while place < n_blunt and n_left < place:
             blunt[n_left] = blunt[place]
@@ -138,7 +147,7 @@ def clip_ears(
         n_blunt = n_left if n_left < place else n_blunt
         if size - n_ears == 4 and is_ear:  # the other triangle is not turned either
             d = after[c]
-            is_ear = (cx - ax) * (y[d] - ay) - (cy - ay) * (x[d] - ax) >= 0
+            is_ear = (cx - ax) * (y[d] - ay) - (cy - ay) * (x[d] - ax) >= (-slack if is_forced else slack)
         n_missed += 1
         if is_ear:
             ears[n_ears, 0], ears[n_ears, 1], ears[n_ears, 2] = a, p, c
@@ -147,7 +156,7 @@ def clip_ears(
             for q in (a, c):
                 i, j = before[q], after[q]
                 if is_blunt[q]:
-                    is_blunt[q] = (x[q] - x[i]) * (y[j] - y[i]) - (y[q] - y[i]) * (x[j] - x[i]) <= 0
+                    is_blunt[q] = (x[q] - x[i]) * (y[j] - y[i]) - (y[q] - y[i]) * (x[j] - x[i]) <= slack
             c = after[c]
         p = c
     return n_ears

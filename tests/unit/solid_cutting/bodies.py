@@ -34,3 +34,19 @@ def star(seed: int, n: int = 6, m: int = 5) -> tuple[np.ndarray, np.ndarray]:
             faces += [(a + k, a + after, b + after), (a + k, b + after, b + k)]
     sizes = np.random.default_rng(seed).uniform(0.5, 2, (len(vertices), 1))
     return vertices * sizes, np.array(faces)
+
+
+def subdivided(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a mesh with each triangle in four, by rounded middles of edges: faces that are nearly in one plane."""
+    sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    edges, of = np.unique(sides, axis=0, return_inverse=True)
+    (a, b, c), (ab, bc, ca) = faces.T, of.reshape(-1, 3).T + len(vertices)
+    rows = [np.stack(row, axis=1) for row in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    return np.concatenate([vertices, vertices[edges].mean(axis=1)]), np.concatenate(rows)
+
+
+def turned(vertices: np.ndarray) -> np.ndarray:
+    """Return vertices turned about (1, 1, 1) by an angle whose cosine is 3 / 5, rounded."""
+    rows = [[0.7333333333333333, -0.3285535, 0.5952201], [0.5952201, 0.7333333333333333, -0.3285535],
+            [-0.3285535, 0.5952201, 0.7333333333333333]]  # fmt: skip
+    return vertices @ np.array(rows)

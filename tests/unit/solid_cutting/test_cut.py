@@ -17,7 +17,7 @@ from engine.solid_cutting.ears import bridge_of
 from engine.solid_cutting.plane_cut import Points
 from engine.solid_cutting.shells import outward
 from tests.reference.cutting import cut_volume, nearest, points_of
-from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
+from tests.unit.solid_cutting.bodies import CUBE, block, joined, star, subdivided, turned
 
 BODIES: dict[str, Any] = {
     "block": lambda draw: joined([(block([0, 0, 0], draw.integers(1, 6, 3)), CUBE)]),
@@ -30,6 +30,7 @@ BODIES: dict[str, Any] = {
                                   for low in ([0, 0, 0], [2, 2, 0], [2, 0, 2], [0, 2, 2])]),
     "columns": lambda draw: joined([(block([i, j, 0], [i + 1, j + 1, int(draw.integers(1, 4))]), CUBE)
                                     for i in range(2) for j in range(2)]),
+    "facets": lambda draw: subdivided(*subdivided(turned(block([0] * 3, draw.integers(1, 6, 3))), CUBE)),
 }  # fmt: skip
 
 
