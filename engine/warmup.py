@@ -321,6 +321,7 @@ def _warm_cutting() -> None:
     overlap_volume(notched, Aabb([0.2] * 3, [0.8] * 3))
     squares = np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]])
     iou(squares, squares + 1.0)
+    iou(squares, np.array([[1.0, 1.0, 2.0, 2.0, 0.5]]))
 
 
 def _notched() -> tuple[Any, Any]:

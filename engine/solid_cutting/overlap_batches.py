@@ -1,8 +1,8 @@
 """Overlaps of many pairs by kernels: convex bodies as flat arrays; polygons of the plane, by the overlay where kernels
 leave one open.
 
-Source: I. E. Sutherland, G. W. Hodgman, 1974; S. Gottschalk, 1996: see `convex_pairs.py`; M. Cyrus, J. Beck, 1978;
-G. Green, 1828: see `convex_rings.py`.
+Source: I. E. Sutherland, G. W. Hodgman, 1974; S. Gottschalk, 1996: see `convex_pairs.py`; H. Edelsbrunner,
+E. P. Muecke, 1990; G. Green, 1828: see `convex_rings.py`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from engine.predicates.rational import nearest_float, nearest_pair
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
 from engine.solid_cutting.convex_pairs import CORNER, PLACED, PLANE, overlap_bodies
-from engine.solid_cutting.convex_rings import MOST_CORNERS, overlap_rings
+from engine.solid_cutting.convex_rings import MOST_CORNERS, overlap_rings, turn_boxes
 from engine.solid_cutting.exact_measures import faces_of_half_spaces
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats
@@ -145,6 +145,8 @@ def _body_of(solid: Convex | Polyhedron, budget: Budget) -> Body | None:
 
 
 _BOX_NUMBERS: Final = 5
+_ROWS: Final = 1 << 14
+"""Boxes whose corners are made at once."""
 _COMFORTABLE: Final = 128
 """Exponents of coordinates up to which areas are far from the least and the largest double."""
 _MOST: Final = np.finfo(np.float64).max
@@ -159,14 +161,15 @@ def overlaps_of_arrays(
     first: Any, second: Any, is_ratio: bool, workers: int | None, budget: Budget
 ) -> tuple[FloatArray, int]:
     """Return areas, or their ratios, of arrays (n, k, 2) of polygons or (n, 5) of boxes, and how many took overlays."""
-    sides = [_corners_of(each, name) for name, each in (("first", first), ("second", second))]
+    sides = [_corners_of(each, name, budget) for name, each in (("first", first), ("second", second))]
     check_same_length(*sides)
     values = np.full(len(sides[0]), np.nan)
     if all(side.shape[1] <= MOST_CORNERS for side in sides):
 
         def fill(start: int, stop: int) -> None:
             some = [side[start:stop] for side in sides]
-            entry_of(overlap_rings)(*some, is_ratio, values[start:stop], budget.flag)
+            scratch = np.empty((4, MOST_CORNERS), np.int64)
+            entry_of(overlap_rings)(*some, is_ratio, scratch, values[start:stop], budget.flag)
 
         run_chunks(fill, len(values), budget=budget, workers=workers)
     rows = np.flatnonzero(np.isnan(values))
@@ -189,15 +192,15 @@ def overlaps_of_arrays(
     return values, len(rows)
 
 
-def _corners_of(each: Any, name: str) -> FloatArray:
+def _corners_of(each: Any, name: str, budget: Budget) -> FloatArray:
     """Return an array of polygons (n, k, 2), or of boxes (n, 5), as corners."""
     if each.ndim == 2 and each.shape[1] == _BOX_NUMBERS:
-        x, y, width, height, angle = as_floats(each, 2, (name,)).T
-        along = np.stack([np.cos(angle), np.sin(angle)], axis=1) / 2
-        across = np.stack([-along[:, 1], along[:, 0]], axis=1) * height[:, None]
-        along = along * width[:, None]
-        ways = (-along - across, along - across, along + across, across - along)
-        each = np.stack([x, y], axis=1)[:, None] + np.stack(ways, axis=1)
+        boxes = as_floats(each, 2, (name,))
+        each = np.empty((len(boxes), 4, 2))
+        for start in range(0, len(boxes), _ROWS):
+            budget.check()
+            some = boxes[start : start + _ROWS]
+            entry_of(turn_boxes)(some, np.cos(some[:, 4]), np.sin(some[:, 4]), each[start : start + _ROWS])
     corners = as_floats(each, 3, (name,))
     if corners.shape[2] != 2:
         raise WrongDimensionError(f"{name} must hold positions of 2 numbers each, got {corners.shape[2]}", (name,))

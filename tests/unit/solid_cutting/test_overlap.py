@@ -31,12 +31,17 @@ def rectangles(draw: np.random.Generator, n: int, kind: int) -> np.ndarray:
     return np.ascontiguousarray(corners[:, ::-1] if kind % 2 else corners)
 
 
+def triangles(draw: np.random.Generator, n: int) -> np.ndarray:
+    """Return triangles (n, 3, 2) of a small lattice, either way round, some flat."""
+    return draw.integers(0, 4, (n, 3, 2)).astype(float)
+
+
 def ratio(both: Fraction, first: Fraction, second: Fraction) -> float:
     union = first + second - both
     return nearest(both / union) if union else 0.0
 
 
-@pytest.mark.parametrize("kind", range(6))
+@pytest.mark.parametrize("kind", range(8))
 def test_arrays_of_convex_polygons(kind: int) -> None:
     draw = np.random.default_rng(kind)
     if kind < 4:
@@ -44,6 +49,11 @@ def test_arrays_of_convex_polygons(kind: int) -> None:
     elif kind == 4:  # the same, its corners turned on, and an ulp away
         first = rectangles(draw, 40, 0)
         second = np.where(draw.random((40, 1, 1)) < 0.5, np.roll(first, 1, axis=1), np.nextafter(first, -9))
+    elif kind == 6:  # corners on sides
+        first = rectangles(draw, 40, 0)
+        second = (first + np.roll(first, 1, axis=1)) / 2
+    elif kind == 7:  # on a lattice: corners on sides and on each other, sides on each other
+        first, second = (triangles(draw, 40) for _ in range(2))
     else:  # a side in common
         first = rectangles(draw, 40, 0)
         second = np.concatenate([first[:, [1, 0]], draw.uniform(0, 3, (40, 1, 2))], axis=1)
