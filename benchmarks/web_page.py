@@ -55,7 +55,9 @@ def with_interval(row: Row, kind: str = "wrong") -> str:
 
 def shown(contender: str) -> str:
     """Return the name of a contender as the pages have it."""
-    return re.sub("^ours", OURS, contender)
+    return (
+        re.sub("^ours", OURS, contender).replace("another half-line", "ray recast").replace("half-line", "ray casting")
+    )
 
 
 def tone(ratio: float) -> str:
@@ -119,8 +121,8 @@ def _side(rows: list[Row], is_book: bool) -> dict[str, Any]:
 
 def short(row: Row) -> str:
     """Return the name of a package, or of a formula, without what it is called for."""
-    name = row["contender"].removeprefix("textbook: ")
-    return re.split(r",? |, ", name)[0] if row["package"] else shown(name)
+    name = shown(row["contender"]).removeprefix("textbook: ")
+    return re.split(r",? |, ", name)[0] if row["package"] else name
 
 
 def _seen(row: Row) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 A contender is one file, with_NAME.py, with `MAKERS`: for each kind of question a function ``(subject, threads[, knob])
 -> Prepared``, called once; that is its build. `PACKAGE` is the distribution that it needs, `NAMES` what it is called in
-tables, by kind ("" for all others). It imports its package when it is imported itself, so one that is not installed is
-detected by `make`. The kinds, their subjects, items and answers:
+tables, by kind ("" for all others), `READERS` its own of files, by suffix. It imports its package when it is imported
+itself, so one that is not installed is detected by `make`. The kinds, their subjects, items and answers:
 
     points            Mesh, Rings, Convex     points                      bool: contained, the boundary too
     scene             Bodies                  points                      point * n_bodies + body, sorted
@@ -165,6 +165,11 @@ def make(module: str, kind: str, subject: Any, threads: int = 2, *setting: float
     if kind not in makers:
         raise NotApplicable(f"has no answer to {kind}")
     return makers[kind](subject, threads, *setting)
+
+
+def readers_of(module: str) -> dict[str, Callable[[str], Any]]:
+    """Return a contender's own readers of files by suffix: vertices and faces, or rings in a tuple."""
+    return getattr(importlib.import_module(f"{__name__}.with_{module}"), "READERS", {})
 
 
 def answers(module: str, kind: str, subject: Any, items: Any, threads: int = 1) -> Any:

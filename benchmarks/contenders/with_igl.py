@@ -11,6 +11,8 @@ from benchmarks.workloads import Mesh
 PACKAGE = "libigl"
 NAMES = {"": "libigl", "points": "libigl winding number", "point distances": "libigl AABB tree"}
 
+READERS = dict.fromkeys((".stl", ".obj", ".off", ".ply"), lambda path: igl.read_triangle_mesh(path)[:2])
+
 
 def _points(mesh: Mesh, threads: int) -> Prepared:
     return Prepared(lambda points: igl.fast_winding_number(mesh.vertices, mesh.faces, points) > 0.5)

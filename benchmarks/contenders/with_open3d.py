@@ -24,6 +24,14 @@ NAMES = {"": "Open3D", "points": "Open3D occupancy", "scene": "Open3D occupancy"
 open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
 
 
+def _read(path: str) -> tuple[np.ndarray, np.ndarray]:
+    made = open3d.io.read_triangle_mesh(path)
+    return np.asarray(made.vertices), np.asarray(made.triangles)
+
+
+READERS = dict.fromkeys((".stl", ".obj", ".off", ".ply", ".glb"), _read)
+
+
 def _scene_of(mesh: Mesh, threads: int) -> RaycastingScene:
     scene = RaycastingScene(nthreads=threads)
     scene.add_triangles(Tensor(mesh.vertices.astype(np.float32)), Tensor(mesh.faces.astype(np.uint32)))

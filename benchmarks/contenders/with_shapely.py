@@ -6,6 +6,7 @@ It lets go of the interpreter lock, so points are split over as many threads as 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,14 @@ def even_odd(rings: list[np.ndarray]) -> Any:
         if made.is_valid:
             return made
     return shapely.symmetric_difference_all([shapely.make_valid(polygon) for polygon in polygons])
+
+
+def _read(path: str) -> tuple[list[Any]]:
+    made = shapely.from_geojson(Path(path).read_text("utf-8"))
+    return ([list(ring.coords)[:-1] for ring in (made.exterior, *made.interiors)],)
+
+
+READERS = {".geojson": _read}
 
 
 def _points(subject: Rings, threads: int) -> Prepared:

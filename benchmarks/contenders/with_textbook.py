@@ -84,24 +84,36 @@ def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(ask)
 
 
-def _first_hits(mesh: Mesh, threads: int) -> Prepared:
+def _hits_of(answer: Callable[[list[np.ndarray]], Any]) -> Maker:
     """Every triangle for every segment: two cross products, four products, three comparisons (Moller, Trumbore)."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    first, second = b - a, c - a
 
-    def one(segment: np.ndarray) -> float:
-        way, off = segment[1] - segment[0], segment[0] - a
-        p, q = np.cross(way, second), np.cross(off, first)
-        scale = (first * p).sum(axis=1)
-        u, v, t = (off * p).sum(axis=1) / scale, (q @ way) / scale, (second * q).sum(axis=1) / scale
-        return float(np.min(t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1)], initial=np.inf))
+    def make(mesh: Mesh, threads: int) -> Prepared:
+        a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+        first, second = b - a, c - a
 
-    def ask(segments: np.ndarray) -> np.ndarray:
-        with np.errstate(all="ignore"):
-            result = np.array([one(segment) for segment in segments])
-        return np.where(np.isinf(result), np.nan, result)
+        def one(segment: np.ndarray) -> np.ndarray:
+            way, off = segment[1] - segment[0], segment[0] - a
+            p, q = np.cross(way, second), np.cross(off, first)
+            scale = (first * p).sum(axis=1)
+            u, v, t = (off * p).sum(axis=1) / scale, (q @ way) / scale, (second * q).sum(axis=1) / scale
+            return t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1)]
 
-    return Prepared(ask)
+        def ask(segments: np.ndarray) -> Any:
+            with np.errstate(all="ignore"):
+                return answer([one(segment) for segment in segments])
+
+        return Prepared(ask)
+
+    return make
+
+
+def _first_of(hits: list[np.ndarray]) -> np.ndarray:
+    return np.array([np.min(t) if len(t) else np.nan for t in hits])
+
+
+def _volume(mesh: Mesh, threads: int) -> Prepared:
+    """The tetrahedra of the faces and the origin, with their signs."""
+    return Prepared(lambda _: np.linalg.det(mesh.vertices[mesh.faces]).sum() / 6)
 
 
 def _distances(mesh: Mesh, threads: int) -> Prepared:
@@ -157,7 +169,9 @@ MAKERS: dict[str, Maker] = {
     "recast": _recast,
     "polygon areas": _polygon_areas,
     "overlay": _overlay,
-    "first hits": _first_hits,
+    "first hits": _hits_of(_first_of),
+    "all hits": _hits_of(lambda hits: [(i, float(t)) for i, some in enumerate(hits) for t in some]),
+    "volume": _volume,
     "point distances": _distances,
     "pair by vertices": _pair("vertices in the other"),
     "pair by edges": _pair("edges through faces"),

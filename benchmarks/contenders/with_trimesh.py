@@ -18,6 +18,14 @@ PACKAGE = "trimesh"
 NAMES = {"": "trimesh + embreex"}
 
 
+def _read(path: str) -> tuple[np.ndarray, np.ndarray]:
+    made = trimesh.load(path, force="mesh")
+    return made.vertices, made.faces
+
+
+READERS = dict.fromkeys((".stl", ".obj", ".off", ".ply", ".glb"), _read)
+
+
 def _made(mesh: Mesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 

@@ -29,6 +29,8 @@ from vtkmodules.vtkFiltersGeneral import (
     vtkIntersectionPolyDataFilter,
 )
 from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints
+from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
+from vtkmodules.vtkIOPLY import vtkPLYReader
 
 from benchmarks.contenders import Couple, Prepared, each_or_nan, is_closed, meshes_of
 from benchmarks.workloads import Mesh
@@ -50,6 +52,21 @@ def _data(vertices: np.ndarray, faces: np.ndarray) -> vtkPolyData:
     result.SetPoints(points)
     result.SetPolys(cells)
     return result
+
+
+def _reader(kind: type[vtkAlgorithm]) -> Callable[[str], tuple[np.ndarray, np.ndarray]]:
+    def read(path: str) -> tuple[np.ndarray, np.ndarray]:
+        reader = kind()
+        reader.SetFileName(path)
+        reader.Update()
+        data = reader.GetOutput()
+        faces = vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+        return vtk_to_numpy(data.GetPoints().GetData()).astype(float), faces
+
+    return read
+
+
+READERS = {".stl": _reader(vtkSTLReader), ".obj": _reader(vtkOBJReader), ".ply": _reader(vtkPLYReader)}
 
 
 def _made(mesh: Mesh) -> vtkPolyData:

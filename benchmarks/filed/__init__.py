@@ -25,12 +25,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import engine
-from benchmarks.contenders import NotApplicable, Placed, answers, rings_of, stated
+from benchmarks.contenders import NotApplicable, Placed, answers, readers_of, rings_of, stated
 from benchmarks.filed import museum
 from benchmarks.machine import version_of
 from benchmarks.workloads import Mesh, Rings
 
 PATH = Path(__file__).resolve().parent / "cases.json"
+FILES = PATH.parent / "files"
 OUTCOMES = ("right", "wrong", "refused", "crashed", "no answer in time")
 LIMIT = 20.0
 """Seconds for one case; imports count towards the first."""
@@ -52,8 +53,8 @@ class Peer(NamedTuple):
 POINTS, PIECES, PAIR = {"locate 3D": "points"}, {"clip_segments 3D": "pieces"}, {"collide 3D": "pair"}
 OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "polygon areas"}
 PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
-BOOK = PLANE | {"overlay 2D": "overlay", "collide 3D": "pair by volumes"}
 HITS, AWAY, VOLUME = {"hits 3D": "all hits"}, {"distances 3D": "point distances"}, {"volume 3D": "volume"}
+BOOK = PLANE | {"overlay 2D": "overlay", "collide 3D": "pair by volumes"} | HITS | AWAY | VOLUME
 CUTS = {"cut 3D": "cut volumes", "section 3D": "section areas"} | VOLUME
 PEERS = (
     Peer("ours", "", {}),
@@ -74,8 +75,33 @@ PEERS = (
 
 
 def load() -> list[Case]:
-    """Return the cases."""
+    """Return the cases, with what stands in their files as `input`, and with the names of the files as `given`."""
+    return [case | {"input": read(case["input"]), "given": case["input"]} for case in _stored()]
+
+
+def _stored() -> list[Case]:
     return json.loads(PATH.read_text("utf-8"))
+
+
+def read(given: dict[str, Any], module: str = "") -> dict[str, Any]:
+    """Return an input with its files read, by the contender's own reader where it has one, else by ours."""
+    readers = OUR_READERS | (readers_of(module) if module else {})
+    result = dict(given)
+    for key, solid in given.items():
+        if isinstance(solid, dict) and "file" in solid:
+            path = FILES / solid["file"]
+            fields = ("rings",) if solid["type"] == "polygon" else ("vertices", "faces")
+            parts = [np.asarray(part).tolist() for part in readers[path.suffix](str(path))]
+            result[key] = {"type": solid["type"]} | dict(zip(fields, parts, strict=True))
+    return result
+
+
+def _our_rings(path: str) -> tuple[list[Any]]:
+    (feature,) = engine.read_layer(path)["features"]
+    return ([ring[:-1] for ring in feature["geometry"]["coordinates"]],)
+
+
+OUR_READERS = {f".{name}": engine.read_mesh for name in ("stl", "obj", "off", "ply", "glb")} | {".geojson": _our_rings}
 
 
 def kind_of(case: Case) -> str:
@@ -205,7 +231,8 @@ def _answer(peer: Peer, case: Case) -> tuple[str, str, list[int]]:
 
             is_ok = OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"]
             return "right" if is_ok else "wrong", "", []
-        answer = _answer_of_peer(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
+        data = read(case.get("given", case["input"]), peer.module)
+        answer = _answer_of_peer(peer.module, peer.calls[kind_of(case)], case["operation"], data)
         return ("right", "", []) if is_right(case, answer) else ("wrong", *museum.said(case, answer))
     except NotApplicable:
         return "not applicable", "", []
@@ -308,7 +335,7 @@ def write_answers() -> None:
     """Compute every exact answer by the rational reference."""
     from tests.hard.operations import OPERATIONS
 
-    cases = [case | {"answer": OPERATIONS[case["operation"]].exact(case["input"])} for case in load()]
+    cases = [case | {"answer": OPERATIONS[case["operation"]].exact(read(case["input"]))} for case in _stored()]
     PATH.write_text("[\n" + ",\n".join(json.dumps(case) for case in cases) + "\n]\n", "utf-8")
 
 

@@ -35,13 +35,20 @@ def text_of(rows: list[dict[str, Any]], cases: list[Case], path: str) -> str:
             answered.setdefault(row["case"], []).append(one)
     shown = [
         {key: case[key] for key in ("id", "thread", "about")} | {"made": case.get("made", False)}
-        | {"exact": exact_words(case), "request": request(case), "today": answered[case["id"]]}
+        | {"files": files_of(case), "exact": exact_words(case), "request": request(case), "today": answered[case["id"]]}
         for case in cases if case["id"] in answered
     ]  # fmt: skip
-    shown.sort(key=lambda one: min(_rank(outcome) for _, outcome, *_ in one["today"]))  # rules of boundaries last
+    # files first, rules of boundaries last
+    shown.sort(key=lambda one: (min(_rank(outcome) for _, outcome, *_ in one["today"]), not one["files"]))
     wrong = sum(row["contender"] == "ours" and row["outcome"] != "right" for row in rows)
     versions = dict.fromkeys(f"{row['contender']} {row['version']}" for row in rows if row["version"])
     return written("museum", {"cases": shown, "ours": wrong, "versions": ", ".join(versions), "results": path})
+
+
+def files_of(case: Case) -> list[str]:
+    """Return the names of the files that a case is read from."""
+    given = case.get("given", {}).values()
+    return [solid["file"] for solid in given if isinstance(solid, dict) and "file" in solid]
 
 
 def _rank(outcome: str) -> int:
@@ -152,10 +159,12 @@ def wrong_lines(case: Case, answer: Any) -> list[int]:
 def said_of_lines(case: Case, answer: Any) -> tuple[str, list[int]]:
     """Return how often the first segment that is hit elsewhere than exactly is hit, and all such segments."""
     wrong = wrong_lines(case, answer)
-    n_exact = sum(hit["segment"] == wrong[0] for hit in case["answer"])
-    found = plural(sum(segment == wrong[0] for segment, _ in places(answer)), "place")
+    exact, result = ([t for segment, t in places(hits) if segment == wrong[0]]
+                     for hits in ([(hit["segment"], hit["t"]) for hit in case["answer"]], answer))  # fmt: skip
     which = f" of line {wrong[0] + 1}" if len(case["input"]["segments"]) > 1 else ""
-    return f"{found}{which} hit, exactly {n_exact}", wrong
+    if len(exact) == len(result):
+        return f"{len(wrong)} of the lines hit elsewhere, the first at {result[0]!r}, exactly {exact[0]!r}", wrong
+    return f"{plural(len(result), 'place')}{which} hit, exactly {len(exact)}", wrong
 
 
 def numbers(values: Any) -> str:

@@ -13,9 +13,8 @@ function asking([path, body]) {
 
 // The body of a request as a picture; wrong: the items among points and segments that somebody gets wrong.
 function drawing(body, wrong = new Set()) {
-  const flat = p => p.length === 3 ? [p[0] - 0.45 * p[1], p[2] - 0.3 * p[1] - 0.15 * p[0]] : p;
   const shapes = [], dots = [];
-  const add = (rings, color, kind, width = 1.5) => shapes.push({rings: rings.map(ring => ring.map(flat)), color, kind, width});
+  const add = (rings, color, kind, width = 1.5) => shapes.push({rings, color, kind, width});
   const moved = pose => pose ? p => pose.rotation.map((row, i) => row.reduce((sum, r, k) => sum + r * p[k], pose.translation[i])) : p => p;
   const solid = (s, color, pose) => {
     if (!s) return;
@@ -40,19 +39,27 @@ function drawing(body, wrong = new Set()) {
   for (const row of corners ? [...(body.planes || []), ...(half.normal ? [[...half.normal, half.offset]] : [])] : []) {  // a patch of the plane
     const n = row.slice(0, 3), size = Math.hypot(...n), unit = n.map(x => x / size), axes = [0, 1, 2];
     const middle = axes.map(i => corners.reduce((sum, p) => sum + p[i] / corners.length, 0));
-    const reach = 0.6 * Math.max(...axes.map(i => Math.max(...corners.map(p => p[i])) - Math.min(...corners.map(p => p[i]))));
+    const along = way => { const places = corners.map(p => p.reduce((sum, x, i) => sum + x * way[i], 0)); return 0.6 * (Math.max(...places) - Math.min(...places)); };
     const above = unit.reduce((sum, x, i) => sum + x * middle[i], row[3] / size), foot = middle.map((x, i) => x - above * unit[i]);
     const least = axes.reduce((a, i) => Math.abs(unit[i]) < Math.abs(unit[a]) ? i : a, 0), other = axes.map(i => (i === least) - unit[least] * unit[i]);
     const u = other.map(x => x / Math.hypot(...other)), v = axes.map(i => unit[(i + 1) % 3] * u[(i + 2) % 3] - unit[(i + 2) % 3] * u[(i + 1) % 3]);
-    add([[[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([a, b]) => foot.map((x, i) => x + reach * (a * u[i] + b * v[i])))], "var(--peer)", "area");
+    add([[[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([a, b]) => foot.map((x, i) => x + a * along(u) * u[i] + b * along(v) * v[i]))], "var(--peer)", "area");
   }
   solid(body.second || body.clip, "var(--peer)", body.poses && body.poses[0]);
   (body.bodies || []).forEach((each, i) => solid(each.solid, i ? "var(--peer)" : "var(--book)", each.pose));
   (body.segments || []).forEach((s, i) => add([s], wrong.has(i) ? "var(--bad)" : "var(--ours)", "line", 2.5));
   (body.polygons || []).forEach(rings => add(rings, "var(--ours)", "area", 2));
-  (body.points || []).forEach((p, i) => dots.push([flat(p), wrong.has(i)]));
+  (body.points || []).forEach((p, i) => dots.push([p, wrong.has(i)]));
+  const given = [...shapes.flatMap(shape => shape.rings.flat()), ...dots.map(dot => dot[0])];
+  if (!given.length) return "";
+  // Axes along which the input is more than a hundred times as short as along another are stretched, and the picture says so.
+  const lows = given[0].map((_, i) => given.map(p => p[i]).reduce((a, b) => Math.min(a, b)));
+  const sizes = lows.map((low, i) => given.map(p => p[i]).reduce((a, b) => Math.max(a, b)) - low), longest = Math.max(...sizes);
+  const stretch = sizes.map(size => size > 0 && longest > 100 * size ? longest / size : 1), isStretched = stretch.some(by => by > 1);
+  const flat = p => { const q = p.map((x, i) => (x - lows[i]) * stretch[i]); return q.length === 3 ? [q[0] - 0.45 * q[1], q[2] - 0.3 * q[1] - 0.15 * q[0]] : q; };
+  for (const shape of shapes) shape.rings = shape.rings.map(ring => ring.map(flat));
+  for (const dot of dots) dot[0] = flat(dot[0]);
   const all = [...shapes.flatMap(shape => shape.rings.flat()), ...dots.map(dot => dot[0])];
-  if (!all.length) return "";
   const least = (f, i) => all.map(p => p[i]).reduce((a, b) => f(a, b));
   const [x0, x1, y0, y1] = [least(Math.min, 0), least(Math.max, 0), least(Math.min, 1), least(Math.max, 1)];
   const scale = Math.min(360 / Math.max(x1 - x0, 1e-300), 260 / Math.max(y1 - y0, 1e-300));
@@ -61,5 +68,6 @@ function drawing(body, wrong = new Set()) {
   const size = dots.length > 40 ? 2.5 : 4.5;
   return `<svg viewBox="0 0 400 300" role="img" aria-label="The input">`
     + shapes.map(({rings, color, kind, width}) => `<path d="${rings.map(ring => "M" + ring.map(at).join("L") + (kind === "area" ? "Z" : "")).join("")}" fill="${kind === "area" ? color : "none"}" fill-opacity=".14" fill-rule="evenodd" stroke="${color}" stroke-width="${width}" stroke-linecap="round"/>`).join("")
-    + dots.map(([p, isWrong]) => { const [cx, cy] = at(p).split(","); return `<circle cx="${cx}" cy="${cy}" r="${isWrong ? size + 1 : size}" fill="var(--${isWrong ? "bad" : wrong.size ? "ink" : "ours"})"/>`; }).join("") + "</svg>";
+    + dots.map(([p, isWrong]) => { const [cx, cy] = at(p).split(","); return `<circle cx="${cx}" cy="${cy}" r="${isWrong ? size + 1 : size}" fill="var(--${isWrong ? "bad" : wrong.size ? "ink" : "ours"})"/>`; }).join("")
+    + (isStretched ? `<text class="soft" x="8" y="294">axes stretched: ${sizes.map(size => size.toPrecision(2)).join(" by ")}</text>` : "") + "</svg>";
 }

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from benchmarks.filed import FILES, PATH, load, museum
 from tests.hard.operations import OPERATIONS
 
-PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "filed" / "cases.json"
-CASES = json.loads(PATH.read_text("utf-8"))
+CASES = load()
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["id"] for case in CASES])
@@ -26,6 +27,21 @@ def test_cases_are_distinct_and_name_their_threads() -> None:
     assert all(case["thread"].count("#") == 1 and case["id"].startswith(case["thread"]) for case in CASES)
     assert len({case["thread"] for case in CASES}) >= 30
     assert len(CASES) >= 160
+
+
+def test_cases_are_read_from_files() -> None:
+    """At least twelve, of six formats; every file is used, and the numbers asked about are those that stand in it."""
+    named = {case["id"]: museum.files_of(case) for case in CASES}
+    files = {name for names in named.values() for name in names}
+    assert sum(map(bool, named.values())) >= 12
+    assert files == {path.name for path in FILES.iterdir()}
+    assert {Path(name).suffix for name in files} == {".stl", ".obj", ".off", ".ply", ".glb", ".geojson"}
+    for case in CASES:
+        for key, solid in case["given"].items():
+            if isinstance(solid, dict) and not solid.get("file", ".glb").endswith(".glb"):  # GLB: float32 in octets
+                read, text = case["input"][key], (FILES / solid["file"]).read_text("utf-8")
+                points = read["vertices"] if "vertices" in read else read["rings"][0]
+                assert {x for point in points for x in point} <= set(map(float, re.findall(r"-?\d[\d.e-]*", text)))
 
 
 def test_whoever_filed_what_stands_in_our_own_files_is_credited() -> None:

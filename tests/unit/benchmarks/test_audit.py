@@ -40,7 +40,7 @@ def test_points_and_who_is_wrong_about_which(tmp_path: Path, capsys: pytest.Capt
     found = audited(tmp_path, SQUARE, points)
     assert found["ours"] == {"judged": 4, "wrong": 0, "refused": 0, "outside": 0, "where": []}
     assert found["textbook: half-line"]["where"] == [1]
-    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("textbook: half-line  "))
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("textbook: ray casting  "))
     assert line.split()[-5:] == ["1", "(4.6%", "to", "70%)", "1"]
     assert {"textbook: signed angles", "textbook: same side, float32"} <= set(found)
 

@@ -16,6 +16,7 @@ RESULTS = report.named_by_the_page()
 FOUND: dict[str, Any] = json.loads(RESULTS.read_text("utf-8"))
 PAGE = (report.DOCS / "speed_and_error.html").read_text("utf-8")
 DATA = json.loads(PAGE[PAGE.index('type="application/json">') + 24 :].partition("</script>")[0])
+SHOWN = {"textbook: half-line": "textbook: ray casting", "textbook: another half-line": "textbook: ray recast"}
 SPEED = re.compile(r"(?:([\d,.]+)x (faster|slower) than|the same as) ")
 SHARE = re.compile(r"wrong in ([\d.]+)% \(([\d.]+)%? to ([\d.]+)%\)|silent in ([\d.]+)%")
 
@@ -107,7 +108,7 @@ def wrong_figures(found: dict[str, Any]) -> list[str]:
             if (
                 not all(same)
                 or key != f"{line['operation']}, {line['contest']}"
-                or row["name"] != line["contender"].replace("ours", "exact-geometry")
+                or row["name"] != SHOWN.get(line["contender"], line["contender"].replace("ours", "exact-geometry"))
             ):
                 bad.append(f"{key}: {row['name']}")
     ours = [row["errors"] for row in found["rows"] if row["contender"] == "ours"]

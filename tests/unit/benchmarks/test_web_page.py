@@ -195,4 +195,31 @@ def test_the_pages_as_committed(browser: Any, name: str, width: int, scheme: str
         page.locator("nav button", has_text="all").first.click()
         assert page.locator("article").count() >= 120 > n_failed > 0
         assert page.locator("article svg").count() == page.locator("article").count()
+        house = page.locator("article", has_text="opencitymodel#11 points").locator("svg")  # in degrees and metres
+        box = house.evaluate("svg => { const {width, height} = svg.getBBox(); return [width, height]; }")
+        assert min(box) > 150
+        assert "axes stretched: 0.000084 by 0.00018 by 9.0" in house.text_content()
     assert troubles == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["speed_and_error", "museum", "audit"])
+def test_axe_finds_no_violation(browser: Any, tmp_path: Path, name: str, scheme: str) -> None:
+    """The report with a question and a contender open, the museum with a request open, the page of an audit."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+    page = browser.new_page(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
+    file = DOCS / f"{name}.html"
+    if name == "audit":
+        file = tmp_path / "audit.html"
+        file.write_text(web_page.text_of(FOUND, "this page", (("a.stl", "containment 2D", "", "boundary"),)))
+    page.goto(file.as_uri())
+    if name == "museum":
+        page.locator("article summary").first.click()
+    else:
+        if page.locator("#panel").is_hidden():
+            page.locator("#questions button").first.click()
+        page.locator("g.mark").last.press("Enter")
+        assert page.locator("#detail").is_visible()
+    found = axe.Axe().run(page).response["violations"]
+    assert [(rule["id"], [node["html"] for node in rule["nodes"]]) for rule in found] == []
+    page.close()
