@@ -295,6 +295,7 @@ def _warm_distances() -> None:
     for solid in (_cube(), Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9)):
         distances([[3.0, 0.25, 0.5]], solid)
     distances([[3.0, 0.25, 0.5]], Triangle([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), nearest=True)
+    Scene([_cube(), Sphere([9, 0, 0], 1)]).distances([[3.0, 0.25, 0.5]])
 
 
 def _warm_bounds() -> None:

@@ -13,9 +13,11 @@ import numpy as np
 from engine.collision.exact_images import image_half_space, image_point
 from engine.compiling.jit import entry_of
 from engine.distance.point_formulas import fill_from_ball, fill_from_planes
-from engine.distance.point_measures import OTHER, Answers, Features
+from engine.distance.point_measures import Answers
+from engine.distance.point_mesh import OTHER, Features
 from engine.errors import EmptyGeometryError, NotRepresentableError
-from engine.predicates.rational import dot, nearest_with_root
+from engine.predicates.expansion import is_safe
+from engine.predicates.rational import dot, nearest_pair, nearest_with_root
 from engine.running.budget import Budget, poll
 from engine.solids.checks import check_finite
 from engine.solids.pose import Pose
@@ -104,6 +106,8 @@ class BallMeasure(_ByFormula):
 
     def __init__(self, solid: Sphere, pose: Pose | None) -> None:
         self.centre, self.radius = image_point(solid.center.tolist(), pose), Fraction(float(solid.radius))
+        self.numbers = _ball_numbers(self.centre, float(solid.radius), pose is None)
+        """As `nearest_on_ball` takes it; None for numbers that kernels do not take."""
         if pose is None:
             self.kernels = ((fill_from_ball, solid.center, float(solid.radius)),)
 
@@ -116,6 +120,17 @@ class BallMeasure(_ByFormula):
             return Rooted(r, _ZERO, _ONE), foot, -1
         sign = 1 if s >= r * r else -1
         return Rooted(-sign * r, _ONE * sign, s), [Rooted(c, x * r / s, s) for c, x in zip(self.centre, way)], -1
+
+
+def _ball_numbers(centre: Vector, radius: float, is_exact: bool) -> FloatArray | None:
+    """Return (8,): a centre in double-doubles, radius and whether the centre is exact, or None."""
+    numbers, d = np.zeros(8), len(centre)
+    try:
+        numbers[: 2 * d] = np.ravel([nearest_pair(*Fraction(x).as_integer_ratio()) for x in centre])
+    except OverflowError:
+        return None
+    numbers[6:] = radius, is_exact
+    return numbers if all(is_safe(x) for x in numbers[: 2 * d : 2].tolist()) and is_safe(radius) else None
 
 
 class PlanesMeasure(_ByFormula):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, TypeAlias, cast
 
@@ -14,16 +13,8 @@ from engine.containment.locate import SMALL_BATCH, locate_small_batch
 from engine.containment.locators import Locator
 from engine.containment.posed_locators import posed_locator
 from engine.distance.clearance import checked_distance
-from engine.distance.point_measures import (
-    KINDS,
-    NOWHERE,
-    OTHER,
-    Answers,
-    Features,
-    Lines,
-    Measure,
-    TriangleMeasure,
-)  # fmt: skip
+from engine.distance.point_measures import Answers, Lines, Measure, TriangleMeasure
+from engine.distance.point_mesh import KINDS, NOWHERE, OTHER, Features
 from engine.errors import EmptyGeometryError, InvalidOperationError
 from engine.running.budget import UNLIMITED, Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options, is_unlimited, run_chunks
@@ -100,15 +91,23 @@ def has_inside(solid: Any) -> bool:
     return row_of(solid).exact is not None or row_of(solid).exact_posed is not None
 
 
-def measure_of(solid: Any, pose: Pose | None, where: tuple[str | int, ...] = ("solid",)) -> Measure:
-    """Return the measure of a solid under a pose. Raises: UnsupportedSolidError, EmptyGeometryError."""
-    made: Callable[[Any, Any], Measure] | None = TriangleMeasure if isinstance(solid, Lines) else row_of(solid).measure
-    if made is None:
+def check_measured(solid: Any, body: int | None = None) -> None:
+    """Raise unless distances can be measured from a solid. body: its number in a scene. Raises: UnsupportedSolidError,
+    EmptyGeometryError."""
+    where: tuple[str | int, ...] = ("solid",) if body is None else ("solids", body)
+    if not isinstance(solid, Lines) and row_of(solid).measure is None:
         raise refused(solid, "distances are not measured from", lambda row: row.measure, where=where)
     if solid.type in ("polygon", "lines") and not len(solid.vertices):
-        raise EmptyGeometryError(f"{where[0]} has no point to be near: it is an empty {solid.type}", where)
+        name = "solid" if body is None else f"solids[{body}]"
+        raise EmptyGeometryError(f"{name} has no point to be near: it is an empty {solid.type}", where)
+
+
+def measure_of(solid: Any, pose: Pose | None) -> Measure:
+    """Return the measure of a solid under a pose. Raises: as `check_measured`."""
+    check_measured(solid)
+    made: Any = TriangleMeasure if isinstance(solid, Lines) else row_of(solid).measure
     if pose is not None:
-        return made(solid, pose)
+        return cast(Measure, made(solid, pose))
     measure: Measure = solid.prepared("measure", lambda: made(solid, None))
     return measure
 
@@ -165,9 +164,9 @@ class PointQuery:
 
     def __init__(
         self, points: FloatArray, solid: Any, pose: Pose | None, limit: float | None, is_named: bool, budget: Budget,
-        to_boundary: bool = False, is_signed: bool = False, where: tuple[str | int, ...] = ("solid",),
+        to_boundary: bool = False, is_signed: bool = False,
     ) -> None:  # fmt: skip
-        self.measure, self.n_exact = measure_of(solid, pose, where), 0
+        self.measure, self.n_exact = measure_of(solid, pose), 0
         self._order = self.measure.order(points)
         self.points = points if self._order is None else read_only(points[self._order])
         self.limit, self.is_signed = limit, is_signed

@@ -4,7 +4,8 @@ NaN for rational arithmetic.
 **Bounds** (u^2 = 2^-106). A difference of two doubles is exact; squares, their sum and its root are off by less than
 2^-99 of the root, the difference of root and radius by 2^-99 of both. A height over a plane is a sum of d exact
 products and the offset, off by 2^-101 of the sum of magnitudes; the quotient by the length of the normal by 2^-99 of
-itself.
+itself. `nearest_on_ball` takes a centre in double-doubles, off by 2^-105 of its largest coordinate, so that with M the
+largest coordinate of all, offsets are off by 2^-102 M, the distance of the centre by 2^-101 M and 2^-99 of itself.
 Coordinates are zero or within `SMALLEST` .. `LARGEST`, else the point is left open.
 """
 
@@ -14,11 +15,13 @@ from typing import Final
 
 import numpy as np
 
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import called, inline, kernel
 from engine.distance.closed_forms import Wide, less, over, plus, product, root, times
-from engine.predicates.error_free import is_correctly_rounded, two_diff
+from engine.lanes.lanes import array_at
+from engine.predicates.error_free import fast_two_sum, is_correctly_rounded, two_diff
 from engine.predicates.expansion import is_safe
-from engine.types import FlagArray, FloatArray
+from engine.predicates.vectors import largest_of
+from engine.types import FlagArray, FloatArray, Point3
 
 _BOUND: Final = 2.0**-99
 
@@ -85,3 +88,46 @@ def fill_from_planes(
                 least, error = here, bound
         if is_usable:  # several nearly as near: within their errors they round alike, or stay open
             distance[item] = _answer(least, max(error, least.h - lowest) if lowest < least.h else error, most)
+
+
+@inline
+def _offset(x: float, centre: FloatArray, k: int) -> Wide:
+    h, low = two_diff(x, centre[2 * k])
+    return Wide(*fast_two_sum(h, low - centre[2 * k + 1]))
+
+
+@called
+def nearest_on_ball(ball: int, q: Point3, limit: float, foot: FloatArray) -> float:
+    """Return the double nearest to the distance of a point from a ball, 0.0 strictly inside, -1.0 if left open; given a
+    finite limit 0.0 within it, infinity beyond, else `foot` (d,) is set too. ball: address of (8,), the centre in
+    double-doubles (z 0 in the plane), the radius, and 1.0 if the centre is exact.
+
+    With D the distance of the centre, off by e = 2^-101 M + 2^-99 D, and x an offset, a coordinate of the foot is c + x
+    (r / D), off by (r / D) (2^-102 M + e) and 2^-98 (r + M)."""
+    numbers = array_at(ball, (8,), np.float64)
+    x, y, z = _offset(q.x, numbers, 0), _offset(q.y, numbers, 1), _offset(q.z, numbers, 2)
+    radius, size = numbers[6], largest_of(q) + max(abs(numbers[0]), abs(numbers[2]), abs(numbers[4]))
+    square = plus(plus(times(x, x), times(y, y)), times(z, z))
+    if not (is_safe(q.x) and is_safe(q.y) and is_safe(q.z) and square.h > 2.0**-500):
+        return -1.0
+    far = root(square)
+    distance, error = less(far, Wide(radius, 0.0)), 2.0**-101 * size + _BOUND * (far.h + radius)
+    if distance.h < -error:
+        return 0.0
+    if not (distance.h > 2.0**-500 + error and is_correctly_rounded(distance.h, distance.low, error)):
+        return -1.0
+    if limit < np.inf:
+        return -1.0 if distance.h == limit else 0.0 if distance.h < limit else np.inf
+    share = over(Wide(radius, 0.0), far)
+    bound = share.h * (2.0**-102 * size + error) + 2.0**-98 * (radius + size)
+    for k, way in ((0, x), (1, y), (2, z)):
+        if k >= foot.shape[0]:
+            continue
+        end = plus(times(way, share), Wide(numbers[2 * k], numbers[2 * k + 1]))
+        is_proven = is_correctly_rounded(end.h, end.low, bound) and abs(end.h) > 2.0**-500
+        if numbers[7] == 1.0 and way.h == 0.0:
+            end, is_proven = Wide(numbers[2 * k], 0.0), True
+        if not is_proven:
+            return -1.0
+        foot[k] = end.h + 0.0
+    return distance.h

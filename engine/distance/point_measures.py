@@ -12,23 +12,19 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, mesh_body_of_triangles
-from engine.collision.meshes.near_triangles import FACE
-from engine.compiling.jit import entry_of, kernel
+from engine.compiling.jit import entry_of
 from engine.distance.exact import ScaledGap
+from engine.distance.point_mesh import KINDS, CornerNames, Features, corner_names, fill_features, words_of_mesh
 from engine.distance.point_search import Goal, PointRoom, find_nearest_on_mesh, new_point_room
 from engine.distance.spreads import SpreadPair, feature_of, in_space, spread_of
 from engine.distance.traversal import BEYOND, DONE
 from engine.running.budget import Budget
 from engine.solids.base import Preparing, Solid
 from engine.solids.checks import check_finite
-from engine.solids.mesh import Mesh
 from engine.solids.pose import Pose
 from engine.solids.primitives import Sphere, Triangle
-from engine.types import FloatArray, Int8Array, IntArray, read_only
+from engine.types import FloatArray, IntArray
 
-VERTEX, EDGE, WITHIN_FACE, OTHER, NOWHERE = range(5)
-KINDS: Final = ("vertex", "edge", "face", "", "inside")
-"""Names of features by code; OTHER: the surface of a ball, a plane; NOWHERE: the point itself lies in the solid."""
 _ROOM: Final = 256
 _MANY: Final = 4096
 """Points, and triangles, from which the order of the points pays."""
@@ -43,14 +39,6 @@ class Answers(NamedTuple):
     feet: FloatArray
     codes: IntArray
     is_named: bool
-
-
-class Features(NamedTuple):
-    """What nearest points lie on: face (n,) and numbers (n, 2), filled with -1, kind (n,) with NOWHERE."""
-
-    face: IntArray
-    kind: Int8Array
-    numbers: IntArray
 
 
 class Measure(Protocol):
@@ -106,7 +94,7 @@ _NAMED: Final = Goal(np.inf, -1.0, np.inf, True)
 _rooms = threading.local()
 
 
-def _room() -> PointRoom:
+def thread_room() -> PointRoom:
     """Return this thread's work space, cached."""
     room: PointRoom | None = getattr(_rooms, "room", None)
     if room is None:
@@ -120,7 +108,11 @@ class TriangleMeasure:
     def __init__(self, solid: Solid, pose: Pose | None) -> None:
         self.solid, self.body = solid, _spread(solid)
         self.own = STILL if pose is None else in_space(pose.rotation[None], pose.translation[None])
-        self._spot = Sphere(np.zeros(solid.dimension), 0.0)
+        numbers = np.concatenate([self.own.rotations.ravel(), self.own.translations.ravel()])
+        words, arrays = solid.prepared("point words", lambda: words_of_mesh(self.body.arrays))
+        self.row = int(words.ctypes.data), int(numbers.ctypes.data), pose is not None
+        """What kernels take: addresses of a mesh and of a pose, and whether there is a pose."""
+        self._named = words, arrays, numbers
 
     def fill(
         self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
@@ -157,11 +149,10 @@ class TriangleMeasure:
         if limit is not None:
             goal = Goal(limit * (1.0 + 2.0**-50) + 5e-324, limit * (1.0 - 2.0**-50), limit, False)
         rows = [array[shift:] if goal.is_named else array for array in (answers.codes, answers.feet)]
-        room, n_exact, (item, stop) = _room(), 0, span
+        room, n_exact, (item, stop) = thread_room(), 0, span
         while True:  # bound: each turn answers a point, or doubles the room
             item, how, n = entry_of(find_nearest_on_mesh)(
-                self.body.arrays,
-                self.own,
+                self.row,
                 placed,
                 (item, stop),
                 goal,
@@ -188,8 +179,8 @@ class TriangleMeasure:
     def _pair(self, points: FloatArray, item: int, budget: Budget) -> SpreadPair:
         """Return the solid and point number `item`, a ball without a radius, as a pair of bodies."""
         d = self.solid.dimension
-        spot = in_space(np.eye(d)[None], points[item][None])
-        return SpreadPair(self.solid, self._spot, self.own, spot, budget, (self.body, spread_of(self._spot)))
+        ball, spot = Sphere(np.zeros(d), 0.0), in_space(np.eye(d)[None], points[item][None])
+        return SpreadPair(self.solid, ball, self.own, spot, budget, (self.body, spread_of(ball)))
 
     def _by_integers(
         self, points: FloatArray, item: int, pairs: IntArray, answers: Answers, limit: float | None, budget: Budget
@@ -210,47 +201,21 @@ class TriangleMeasure:
             d = self.solid.dimension
             answers.codes[item], answers.feet[item] = (triangle, gap.gap.first), gap.ends()[0][:d]
 
+    def names(self) -> CornerNames | None:
+        """Return the names of the corners of the triangles, None if there are too many faces."""
+        names: CornerNames | None = self.solid.prepared(
+            "corner_names", lambda: corner_names(self.solid, self.body.arrays)
+        )
+        return names
+
     def name(self, codes: IntArray, features: Features) -> None:
         """As `Measure.name`; codes: triangles and codes of features."""
-        corners = _corner_names(self.solid, self.body)
-        if corners is not None:
-            entry_of(fill_features)(codes, self.body.faces, corners, features)
+        names = self.names()
+        if names is not None:
+            entry_of(fill_features)(codes, self.body.faces, names, features)
             return
         for row in np.flatnonzero(codes[:, 1] >= 0).tolist():
             triangle, code = codes[row].tolist()
             kind, numbers = feature_of(self.solid, self.body, triangle, code)
             features.face[row], features.kind[row] = self.body.faces[triangle], KINDS.index(kind)
             features.numbers[row, : len(numbers)] = numbers
-
-
-@kernel
-def fill_features(codes: IntArray, faces: IntArray, corners: IntArray, features: Features) -> None:
-    """Fill features with codes (n, 2), but for rows whose second code is -1. faces (m,), corners (m, 3): by triangle
-    the caller's numbers; an edge between two corners of one number is a vertex."""
-    for row in range(codes.shape[0]):
-        triangle, code = codes[row]
-        if code < 0:
-            continue
-        features.face[row] = faces[triangle]
-        i, j = corners[triangle, code % 3], corners[triangle, (code + 1) % 3]
-        if code == FACE:
-            features.kind[row], features.numbers[row, 0] = WITHIN_FACE, faces[triangle]
-        elif code < 3 or i == j:
-            features.kind[row], features.numbers[row, 0] = VERTEX, i
-        else:
-            features.kind[row], features.numbers[row, 0], features.numbers[row, 1] = EDGE, min(i, j), max(i, j)
-
-
-def _corner_names(solid: Any, body: MeshBody) -> IntArray | None:
-    """Return the caller's number of each corner (m, 3) of the triangles of a body, of several vertices at one position
-    the first; None where edges of triangles are not all edges of faces, or corners have other names (boxes)."""
-    if isinstance(solid, Lines):
-        numbers = solid.edges[:, [0, 1, 1]]
-    elif isinstance(solid, Mesh) and len(solid.face_indices) == 3 * len(solid.triangles):
-        numbers = solid.face_indices.reshape(-1, 3)
-    elif isinstance(solid, Triangle) and solid.dimension == 3:
-        numbers = np.arange(3)[None]
-    else:
-        return None
-    names: IntArray = solid.prepared("corner_names", lambda: read_only(numbers[body.faces]))
-    return names

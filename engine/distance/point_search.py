@@ -27,17 +27,18 @@ Source: N. Roussopoulos, S. Kelley, F. Vincent, Nearest neighbor queries, 1995 (
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH
-from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.near_triangles import FACE, relative_to
 from engine.collision.meshes.placement import PoseArrays, as_placement, defect_of, placed, rotate_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.distance.closed_forms import Wide, Wide3, less, less3
+from engine.distance.point_mesh import PointMesh, mesh_at, pose_at
 from engine.distance.point_triangle import UNSURE, distance_to, feature_under, measure, seen_from
 from engine.distance.refined import (
     CERTAIN,
@@ -80,20 +81,20 @@ _SHORTEST: Final = 2.0**-200
 class PointRoom(NamedTuple):
     """Work space of one search at a time: candidates, of which the first and third columns are used; by level of
     the way down a node, the bits of its children that are left, and those of the nearest of these, nodes (n, 3), and
-    their bounds (n, 8); work (2, 8): of `lanes/points.py`; origin (3,) zeros."""
+    their bounds (n, 8); work (2, 8): of `lanes/points.py`; start (1, 3): the point."""
 
     candidates: Candidates
     nodes: Int32Array
     bounds: Float32Array
     work: Float32Array
-    origin: FloatArray
+    start: FloatArray
 
 
 def new_point_room(room: int) -> PointRoom:
     """Allocate work space for `room` candidates."""
     candidates = Candidates(np.empty((room, 4), np.int64), np.empty(room))
     nodes, bounds = np.empty((MAX_DEPTH + 1, 3), np.int32), np.empty((MAX_DEPTH + 1, LANES), np.float32)
-    return PointRoom(candidates, nodes, bounds, np.empty((2, LANES), np.float32), np.zeros(3))
+    return PointRoom(candidates, nodes, bounds, np.empty((2, LANES), np.float32), np.empty((1, 3)))
 
 
 class Goal(NamedTuple):
@@ -106,14 +107,6 @@ class Goal(NamedTuple):
     is_named: bool
 
 
-class Tree(NamedTuple):
-    """Of a mesh what a search reads, as in `MeshArrays`: few arguments of a call."""
-
-    boxes: Float32Array
-    child: Int32Array
-    blocks: Float32Array
-
-
 class Spot(NamedTuple):
     """Where a search starts: the point in tree coordinates, and reach, S of `lanes/points.py`; for a distant point
     (spread > 0) its direction, and the spread of its bounds."""
@@ -124,7 +117,7 @@ class Spot(NamedTuple):
 
 
 @inline
-def _spot_of(at: Point3, blur: float) -> Spot:
+def spot_of(at: Point3, blur: float) -> Spot:
     """Return a point, given in tree coordinates, as a search takes it. blur: by how much its distances may be off; 2^21
     blur more of S adds as much to the margin of boxes, and four times as much to the slack of triangles."""
     largest, more = largest_of(at), 2.0**21 * blur
@@ -137,7 +130,7 @@ def _spot_of(at: Point3, blur: float) -> Spot:
 
 
 @inline
-def _limit_of(spot: Spot, most: float) -> float:
+def limit_of(spot: Spot, most: float) -> float:
     """Return what bounds of boxes are compared with, the square unless the point is distant, no less than for `most`
     once it is rounded to float32."""
     limit = most if spot.spread > 0.0 else most * most
@@ -145,7 +138,7 @@ def _limit_of(spot: Spot, most: float) -> float:
 
 
 @inline
-def _bound_boxes(tree: Tree, node: int, spot: Spot, bounds: Float32Array, row: int) -> int:
+def bound_boxes(tree: Any, node: int, spot: Spot, bounds: Float32Array, row: int) -> int:
     """Bound the children of a node as `boxes_within` does."""
     at = spot.at
     if spot.spread > 0.0:
@@ -154,10 +147,10 @@ def _bound_boxes(tree: Tree, node: int, spot: Spot, bounds: Float32Array, row: i
 
 
 @inline
-def _next_child(tree: Tree, room: PointRoom, level: int, limit: float) -> tuple[int, int]:
-    """Return (node, level): the next child whose bound is not above the limit, -1 if there is none."""
-    nodes, node = room.nodes, -1
-    while level > 0 and node < 0:  # bound: each turn leaves a level, or takes a child
+def next_child(tree: Any, room: PointRoom, level: int, limit: float) -> tuple[int, int]:
+    """Return (child, level): the next child whose bound is not above the limit; level 0 if there is none."""
+    nodes = room.nodes
+    while level > 0:  # bound: each turn leaves a level, or takes a child
         bits = int(nodes[level - 1, 2])
         lane = lowest_bit(bits | ALL_LANES + 1)
         if bits == 0 or room.bounds[level - 1, lane] > limit:
@@ -165,12 +158,20 @@ def _next_child(tree: Tree, room: PointRoom, level: int, limit: float) -> tuple[
             continue
         rest = int(nodes[level - 1, 1]) & ~(1 << lane)
         nodes[level - 1, 1], nodes[level - 1, 2] = rest, nearest_of(room.bounds, level - 1, rest)
-        node = int(tree.child[nodes[level - 1, 0], lane])
-    return node, level
+        return int(tree.child[nodes[level - 1, 0], lane]), level
+    return -1, 0
 
 
 @inline
-def _bound_block(tree: Tree, node: int, spot: Spot, most: float, work: Float32Array) -> int:
+def enter_node(tree: Any, node: int, spot: Spot, room: PointRoom, level: int) -> int:
+    """Bound the children of an inner node, from which `next_child` chooses; return the new level."""
+    bits, nodes = bound_boxes(tree, node, spot, room.bounds, level), room.nodes
+    nodes[level, 0], nodes[level, 1], nodes[level, 2] = node, ALL_LANES, bits
+    return level + 1
+
+
+@inline
+def _bound_block(tree: PointMesh, node: int, spot: Spot, most: float, work: Float32Array) -> int:
     """Bound the triangles of a block as `triangle_bounds` does."""
     at, slack, most = spot.at, SLACK * spot.reach, most + 2.0**-20 * abs(most) + 1e-37  # rounded to float32
     if spot.spread > 0.0:
@@ -179,23 +180,23 @@ def _bound_block(tree: Tree, node: int, spot: Spot, most: float, work: Float32Ar
 
 
 @called
-def _search(tree: Tree, spot: Spot, most: float, enough: float, room: PointRoom, flag: FlagArray) -> tuple[int, int]:
+def _search(
+    tree: PointMesh, spot: Spot, most: float, enough: float, room: PointRoom, flag: FlagArray
+) -> tuple[int, int]:
     """Fill the candidates; return (outcome, number). CLOSER: a triangle is nearer than `enough`; INTERRUPTED; FULL.
     Lengths are in tree coordinates."""
-    candidates, nodes, work = room.candidates, room.nodes, room.work
-    n_candidates, level, node, limit = 0, 0, 0, _limit_of(spot, most)
+    candidates, work = room.candidates, room.work
+    n_candidates, level, node, limit = 0, 0, 0, limit_of(spot, most)
     while True:  # bound: each node is entered once
         if tree.child[node, 0] >= 0:
-            bits = _bound_boxes(tree, node, spot, room.bounds, level)
-            nodes[level, 0], nodes[level, 1], nodes[level, 2] = node, ALL_LANES, bits
-            level += 1
+            level = enter_node(tree, node, spot, room, level)
         elif flag[0] != 0:
             return INTERRUPTED, 0
         else:
             near = _bound_block(tree, node, spot, most, work)
             if work[0, 0] < most:
                 most = float(work[0, 0])
-                limit = _limit_of(spot, most)
+                limit = limit_of(spot, most)
                 if most < enough:
                     return CLOSER, 0
             while near != 0:  # bound: each turn takes a bit
@@ -210,8 +211,8 @@ def _search(tree: Tree, spot: Spot, most: float, enough: float, room: PointRoom,
                         return FULL, n_candidates
                 candidates.pairs[n_candidates, 0], candidates.bounds[n_candidates] = -1 - child, work[1, lane]
                 n_candidates += 1
-        node, level = _next_child(tree, room, level, limit)
-        if node < 0:
+        node, level = next_child(tree, room, level, limit)
+        if level == 0:
             return DONE, retain_below(candidates, n_candidates, most)
 
 
@@ -279,15 +280,15 @@ def _scaled(t: Facet, unit: float) -> Facet:
 
 @merged
 def _decide(
-    mesh: MeshArrays, pose: PoseArrays, start: FloatArray, unit: float, n: int, goal: Goal, room: PointRoom,
-    foot: FloatArray,
-) -> tuple[float, int, bool]:  # fmt: skip
+    mesh: PointMesh, pose: PoseArrays, unit: float, n: int, goal: Goal, room: PointRoom, foot: FloatArray
+) -> tuple[float, int, bool]:
     """Return (distance, n, is_named): the nearest double, -1.0 if unproven (with a limit: 0.0 within it, infinity
-    beyond), the number of candidates left, and whether row 0 and `foot` name the nearest point. start: the point (3,);
-    unit: power of two that brings all coordinates below 1."""
-    candidates, q, move = room.candidates, as_point3(start, 0), as_point3(pose.translations, 0)
+    beyond; without one infinity beyond `goal.most`), the number of candidates left, and whether row 0 and `foot` name
+    the nearest point. unit: power of two that brings all coordinates below 1."""
+    candidates, start, move = room.candidates, room.start, as_point3(pose.translations, 0)
+    q = as_point3(start, 0)
     pairs = candidates.pairs
-    error = 2.0**-50 * (3.0 * mesh.extent.reach + largest_of(move)) + 2.0**-1060 if pose.is_posed else 0.0
+    error = 2.0**-50 * (3.0 * mesh.reach + largest_of(move)) + 2.0**-1060 if pose.is_posed else 0.0
     place = as_placement(pose, 0, move, error)
     scaled_q, slack = scaled(q, unit), 2.0 * unit * error
     most, largest, shortest, on, is_unsure, is_over = goal.most * unit, 0.0, np.inf, -1, False, False
@@ -319,7 +320,7 @@ def _decide(
         return -1.0, n, False
     n = retain_below(candidates, n, most)
     if is_unsure or n == 0:
-        return (np.inf if n == 0 and goal.limit < np.inf else -1.0), n, False
+        return (np.inf if n == 0 and goal.most < np.inf else -1.0), n, False
     if goal.limit < np.inf:
         if most < goal.enough * unit:
             return 0.0, n, False
@@ -358,51 +359,59 @@ def _power(size: float) -> int:
     return -min(max(math.frexp(size)[1], -1000), 1000)
 
 
-@kernel
-def find_nearest_on_mesh(
-    mesh: MeshArrays, pose: PoseArrays, points: FloatArray, span: tuple[int, int], goal: Goal, answers: FloatArray,
-    codes: IntArray, feet: FloatArray, room: PointRoom, flag: FlagArray,
-) -> tuple[int, int, int]:  # fmt: skip
-    """Fill the NaN entries of answers (n,) for points (n, 3) span[0] .. span[1] - 1: the double nearest to the distance
-    from the triangles of a mesh under a pose, or with a limit 0.0 within it, infinity beyond. If the goal says so, also
-    codes (n, 2), triangle and feature code (`near_triangles.py`), and feet (n, d), the nearest doubles to the nearest
-    point.
-
-    Returns (item, outcome, n): the first point left open, the outcome of its search, and the number of candidates; item
-    span[1] if none is left.
+@called
+def measure_from(
+    words: int, pose_: int, is_posed: bool, q: Point3, goal: Goal, room: PointRoom, foot: FloatArray, flag: FlagArray
+) -> tuple[float, int, int]:
+    """Return (distance, outcome, n) of a point and the mesh at address `words` (`mesh_at`) under the pose at another:
+    the double nearest to the distance, infinity beyond `goal.most`, or with a limit 0.0 within it, infinity beyond;
+    -1.0 if it is left open, then also the outcome of the search and the number of candidates. If the goal says so,
+    also `foot` (d,), the nearest doubles to the nearest point, and in row 0 of the candidates its triangle and, third,
+    its feature code (`near_triangles.py`).
 
     Under a pose R, t the search takes p = R' (q - t) for R^-1 (q - t). With d = |R' R - I| in entries and L = |q - t| +
     |x| for the points x of the mesh, p is off by 3.1 d L, lengths change by 1.6 d L, and rounding is far below; L is
     less than sqrt(3) times the sum of the largest coordinates, a quarter of `size`. `blur` is 16 d of that sum."""
-    o, scale = mesh.origin, mesh.scale
-    move = as_point3(pose.translations, 0)
+    mesh, pose = mesh_at(words), pose_at(pose_, is_posed)
+    o, scale, move = mesh.origin, mesh.scale, as_point3(pose.translations, 0)
     place = as_placement(pose, 0, move, 0.0)
-    defect = defect_of(place)
+    size = 4.0 * (mesh.reach + largest_of(q) + largest_of(move))
+    if not (size < _LARGEST and 0.0 * (q.x + q.y + q.z) == 0.0):  # NaN is lost in `largest_of`
+        return -1.0, BEYOND, 0
+    unit, p = math.ldexp(1.0, _power(size)), rotate_back(place, minus(q, move)) if is_posed else q
+    spot = spot_of(
+        Point3((p.x - o.x) / scale, (p.y - o.y) / scale, (p.z - o.z) / scale), 4.0 * size * defect_of(place) / scale
+    )
+    most, enough = goal.most / scale * _ABOVE_ONE, goal.enough / scale / _ABOVE_ONE
+    if spot.spread > 0.0 or not goal.enough > 0.0:
+        enough = -np.inf
+    how, n = _search(mesh, spot, np.inf if spot.spread > 0.0 else most, enough, room, flag)
+    if how == CLOSER:
+        return 0.0, DONE, n
+    if how != DONE:
+        return -1.0, how, n
+    room.start[0, 0], room.start[0, 1], room.start[0, 2] = q
+    value, n, is_named = _decide(mesh, pose, unit, n, goal, room, foot)
+    return (value if is_named or not goal.is_named or value == np.inf else -1.0), DONE, n
+
+
+@kernel
+def find_nearest_on_mesh(
+    body: tuple[int, int, bool], points: FloatArray, span: tuple[int, int], goal: Goal, answers: FloatArray,
+    codes: IntArray, feet: FloatArray, room: PointRoom, flag: FlagArray,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Fill the NaN entries of answers (n,) for points (n, 3) span[0] .. span[1] - 1 as `measure_from` does, from a body
+    given as its first arguments; if the goal says so, also codes (n, 2), triangle and feature code, and feet (n, d).
+
+    Returns (item, outcome, n): the first point left open, the outcome of its search, and the number of candidates; item
+    span[1] if none is left."""
     for item in range(span[0], span[1]):
         if answers[item] == answers[item]:
             continue
-        q = as_point3(points, item)
-        size = 4.0 * (mesh.extent.reach + largest_of(q) + largest_of(move))
-        if not (size < _LARGEST and 0.0 * (q.x + q.y + q.z) == 0.0):  # NaN is lost in `largest_of`
-            return item, BEYOND, 0
-        unit, p = math.ldexp(1.0, _power(size)), rotate_back(place, minus(q, move)) if pose.is_posed else q
-        blur = 4.0 * size * defect / scale
-        spot = _spot_of(Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale), blur)
-        most, enough = goal.most / scale * _ABOVE_ONE, goal.enough / scale / _ABOVE_ONE
-        if spot.spread > 0.0 or not goal.enough > 0.0:
-            enough = -np.inf
-        how, n = _search(
-            Tree(mesh.boxes, mesh.child, mesh.blocks), spot, np.inf if spot.spread > 0.0 else most, enough, room, flag
-        )
-        if how == CLOSER:
-            answers[item] = 0.0
-            continue
-        if how != DONE:
+        foot = feet[item] if goal.is_named else room.start[0, :0]
+        value, how, n = measure_from(body[0], body[1], body[2], as_point3(points, item), goal, room, foot, flag)
+        if value < 0.0:
             return item, how, n
-        foot = feet[item] if goal.is_named else room.origin[:0]
-        value, n, is_named = _decide(mesh, pose, points[item : item + 1], unit, n, goal, room, foot)
-        if value < 0.0 or (goal.is_named and not is_named):
-            return item, DONE, n
         answers[item] = value
         if goal.is_named:
             codes[item, 0], codes[item, 1] = room.candidates.pairs[0, 0], room.candidates.pairs[0, 2]

@@ -29,11 +29,11 @@ near. A direction off by 2 `error` changes a height, of lengths below 4, by less
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import Placement
 from engine.collision.meshes.triangle_triangle import Facet, corner
@@ -42,7 +42,9 @@ from engine.distance.closed_forms import Wide, Wide3, along3, dot3, less, less3,
 from engine.lanes.boxes import FRAME_ROWS
 from engine.lanes.faces import FIXED_ROWS, GAP_ROWS
 from engine.lanes.tracing import LANES
-from engine.predicates.error_free import is_correctly_rounded, two_diff
+from engine.predicates.error_free import fast_two_sum, is_correctly_rounded, two_diff, workspace
+from engine.predicates.expansion import compress, grow, grow_product, is_safe
+from engine.predicates.vectors import as_point3
 from engine.types import FloatArray, Point3
 
 ROOT: Final = -1
@@ -50,10 +52,10 @@ ROOT: Final = -1
 
 
 class View(NamedTuple):
-    """A body in a search: its mesh, its placement, and `unit`, the power of two by which its coordinates are
-    multiplied."""
+    """A body in a search: its mesh (`MeshArrays` or `PointMesh`), its placement, and `unit`, the power of two by which
+    its coordinates are multiplied."""
 
-    mesh: MeshArrays
+    mesh: Any
     place: Placement
     unit: float
 
@@ -291,6 +293,21 @@ def are_strictly_beyond(
     return True
 
 
+@called
+def _placed_coordinate(row: Point3, v: Point3, shift: float) -> tuple[float, bool]:
+    """Return the double nearest to row . v + shift, and whether that is proven: also of a number halfway between two
+    doubles, as those of corners of lattices are under poses now and then."""
+    if not (is_safe(shift) and is_safe(row.x * v.x) and is_safe(row.y * v.y) and is_safe(row.z * v.z)):
+        return 0.0, False
+    e = workspace(8)
+    n = grow_product(e, grow_product(e, grow_product(e, 0, row.x, v.x), row.y, v.y), row.z, v.z)
+    n = compress(e, grow(e, n, shift))
+    if n == 0:
+        return 0.0, True
+    h, low = fast_two_sum(e[n - 1], e[n - 2] if n > 1 else 0.0)
+    return h, is_correctly_rounded(h, low, 2.0**-51 * abs(e[n - 2]) if n > 2 else 0.0)
+
+
 @inline
 def write_offset_point(
     view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, move: FloatArray,
@@ -311,7 +328,10 @@ def write_offset_point(
             continue
         end = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
         point[k] = end.h / view.unit
-        is_proven = is_proven and is_correctly_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
+        is_sure = is_correctly_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
+        if not is_sure and radius == 0.0 and known[1] < 0:
+            point[k], is_sure = _placed_coordinate(row, as_point3(v, known[0]), move[k])
+        is_proven = is_proven and is_sure
     return is_proven
 
 

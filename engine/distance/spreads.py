@@ -224,7 +224,7 @@ def spread_pair(first: Solid, second: Solid, poses: Poses, budget: Budget) -> Sp
 
 
 BALL: Final = Feature("ball")
-_AROUND: Final = (0, 1, 3, 2)
+AROUND: Final = np.array([0, 1, 3, 2])
 """Corners of a box of the plane in the order of its outline, with the numbers that corners have in space."""
 
 
@@ -273,7 +273,7 @@ class _Names(dict[int, Feature]):
         if not n:
             return BALL
         ends = [number] if number < n else [number - n, self._following[number - n]]
-        ends = sorted(_AROUND[end] if self._is_box else end for end in ends)
+        ends = sorted(int(AROUND[end]) if self._is_box else end for end in ends)
         self[number] = Feature("vertex" if number < n else "edge", tuple(ends))
         return self[number]
 
@@ -332,4 +332,4 @@ def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
 
 def named(solid: Solid, number: int) -> int:
     """Return the caller's number of a vertex: a box of the plane numbers its corners as a box of space does."""
-    return _AROUND[number] if solid.type == "aabb" and solid.dimension == 2 else number
+    return int(AROUND[number]) if solid.type == "aabb" and solid.dimension == 2 else number

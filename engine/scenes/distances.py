@@ -1,28 +1,49 @@
-"""How far points are from the bodies of a scene: the nearest body of each point, and its distance.
+"""How far points are from the bodies of a scene: the nearest body of each point and its distance, or whether one is
+within a distance.
 
-The boxes of the bodies bound their distances from below. Bodies are measured in the order of these bounds, all points
-whose turn comes to the same body together, until no bound of a point is below its distance.
+`nearest_bodies.py` measures most; what it leaves is located or measured here, body by body, in the order of the bounds
+on its distance, until none of a point is below its distance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from engine.distance.distances import Distances, PointQuery
+from engine.compiling.jit import entry_of
+from engine.distance.ball_and_planes import BallMeasure
+from engine.distance.distances import PointQuery, check_measured, has_inside, measure_of
+from engine.distance.point_measures import TriangleMeasure, thread_room
+from engine.distance.point_mesh import NOWHERE, OTHER, Features
+from engine.distance.point_search import new_point_room
 from engine.errors import EmptyGeometryError
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
+from engine.scenes.locate import locate_given
+from engine.scenes.nearest_bodies import (
+    DONE,
+    KIND,
+    N_COLUMNS,
+    NO_CANDIDATES,
+    NO_ROOM,
+    TO_LOCATE,
+    Nearest,
+    Notes,
+    find_nearest_bodies,
+)
 from engine.scenes.placements import Placements
+from engine.solids.base import Solid
+from engine.solids.checks import check_finite
 from engine.solids.columns import Columns
-from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
+from engine.solids.pose import Pose
+from engine.solids.registry import BodyKind
+from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, read_only
 
-_PAIRS: Final = 1 << 20
-"""Pairs of points and bodies whose bounds are in memory at once."""
-_BELOW: Final = 1.0 - 2.0**-48
+_ROOM: Final = 1 << 14
+"""Notes of a kernel in memory at once, if they are enough for a point."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -50,77 +71,154 @@ class SceneDistances(Columns):
     index: IntArray
 
 
+class _Rows:
+    """Rows of bodies (n, N_COLUMNS) as `find_nearest_bodies` reads them, filled body by body on demand."""
+
+    def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None]) -> None:
+        self._solids, self._poses = solids, poses
+        self.rows = np.zeros((len(solids), N_COLUMNS), np.int64)
+        self.rows[:, KIND] = BodyKind.UNREADY
+        self.measures: dict[int, Any] = {}
+        """By body, with what rows name by its address."""
+
+    def prepare(self, body: int) -> None:
+        """Fill the row of a body; threads may do so at the same time, with the same numbers."""
+        solid, pose = self._solids[body], self._poses[body]
+        measure: Any = measure_of(solid, None if pose is None or pose.is_identity else pose)
+        kind, columns = BodyKind.OTHER, (0,) * (N_COLUMNS - 1)
+        if isinstance(measure, TriangleMeasure):
+            names, kind = measure.names(), BodyKind.MESH
+            of_names = (0, 0, 0) if names is None else (len(names.numbers), *(each.ctypes.data for each in names))
+            columns = *measure.row, has_inside(solid), *of_names
+        elif isinstance(measure, BallMeasure) and measure.numbers is not None:
+            kind, columns = BodyKind.BALL, (measure.numbers.ctypes.data, *columns[1:])
+        measure = self.measures.setdefault(body, measure)
+        if self.rows[body, KIND] == BodyKind.UNREADY:
+            self.rows[body, 1:] = columns
+            self.rows[body, KIND] = kind  # order: last, kernels of other threads read it
+
+
 def measure_all(
-    points: FloatArray, placements: Placements, budget: Budget, workers: int | None, progress: Progress | None
-) -> tuple[SceneDistances, Accuracy]:
-    """Return the answer for points (n, d), and its accuracy; caller guarantees a body."""
-    solids, poses = placements.base.solids, placements.poses
-    boxes, n = placements.boxes(budget), len(points)
-    best, body = np.full(n, np.inf), np.full(n, -1)
-    rows: tuple[Any, ...] = (
-        np.empty_like(points),
-        np.empty(n, np.int64),
-        np.empty(n, np.int8),
-        np.empty((n, 2), np.int64),
+    points: FloatArray, scene: Placements, limit: float | None, budget: Budget, workers: int | None,
+    progress: Progress | None,
+) -> tuple[SceneDistances | BoolArray, Accuracy]:  # fmt: skip
+    """Return the answer for points (n, d), with a limit whether a body is within it, and its accuracy; caller
+    guarantees a body."""
+    solids, (n, d), most = scene.base.solids, points.shape, np.inf if limit is None else limit
+    kinds = scene.base.prepared("measured kinds", lambda: _kinds_of(solids, budget))
+    check_finite(points, ("points",))
+    points, words, still = (
+        read_only(points),
+        scene.words(budget),
+        scene.base.prepared("measured", lambda: _rows_of(scene.base)),
     )
-    n_exact = [0]
+    moved = scene.few().prepared("measured", lambda: _rows_of(scene.few())) if scene.moved else _NO_ROWS
+    features = Features(np.full(n, -1), np.full(n, NOWHERE, np.int8), np.full((n, 2), -1))
+    nearest, left = Nearest(np.full(n, np.inf), np.full(n, -1), np.empty((n, d)), features), list[tuple[Any, Any]]()
 
     def task(start: int, stop: int) -> None:
-        for some, number in _turns(points, boxes, best, start, stop, max(1, _PAIRS // len(solids)), budget):
-            query = PointQuery(
-                read_only(points[some]), solids[number], poses[number], None, True, budget, where=("solids", number)
+        n_notes = min(max(_ROOM, 2 * scene.n_rows), 2 * scene.n_rows * (stop - start))
+        notes = Notes(np.empty((n_notes, 3), np.int64), np.empty(n_notes), np.array([start, 0, 0]))
+        room, way, foot, how = thread_room(), new_point_room(1), np.empty(d), NO_ROOM
+        while how != DONE:  # bound: each turn answers a point, fills a row, or doubles the room
+            how = entry_of(find_nearest_bodies)(
+                points, stop, words, still.rows, moved.rows, most, nearest, notes, way, room, foot, budget.flag
             )
-            try:
-                query.fill(0, len(some), budget)
-            except EmptyGeometryError as error:  # of half-spaces, which no box tells
-                raise EmptyGeometryError(
-                    str(error).replace("solid", f"solids[{number}]", 1), ("solids", number)
-                ) from None
-            answer: Distances = query.result()
-            n_exact[0] += query.n_exact
-            is_less = (answer.distance < best[some]) | ((answer.distance == best[some]) & (number < body[some]))
-            some = some[is_less]
-            columns: tuple[Any, ...] = answer.point, answer.face, answer.kind, answer.index
-            best[some], body[some] = answer.distance[is_less], number
-            for row, column in zip(rows, columns):
-                row[some] = column[is_less]
+            budget.check()
+            if how == NO_CANDIDATES:
+                room = new_point_room(2 * len(room.candidates.bounds))
+            elif how in (NO_ROOM, DONE):
+                left.append((notes.rows[: notes.n[1]].copy(), notes.bounds[: notes.n[1]].copy()))
+                notes.n[1] = 0
+            elif notes.n[2] < len(solids):
+                still.prepare(int(notes.n[2]))
+            else:
+                moved.prepare(int(notes.n[2]) - len(solids))
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress)
-    kinds = "+".join(sorted({solid.type for solid in solids}))
-    return SceneDistances(best, body, *rows), Accuracy("exact", 0.5, n, n_exact[0], n_exact[0], kinds)
+    n_exact = _settle(points, nearest, left, scene, limit, budget, workers) if any(len(rows) for rows, _ in left) else 0
+    accuracy = Accuracy("exact", None if limit is not None else 0.5, n, n_exact, n_exact, kinds)
+    if limit is not None:
+        return nearest.distance == 0.0, accuracy
+    _name_late(nearest, scene, still, moved)
+    return SceneDistances(nearest.distance, nearest.body, nearest.point, *features), accuracy
 
 
-def _turns(
-    points: FloatArray, boxes: FloatArray, best: FloatArray, start: int, stop: int, step: int, budget: Budget
-) -> Iterator[tuple[IntArray, int]]:
-    """Yield (points, body): which of the points start .. stop - 1 are to be measured from a body next. boxes: low and
-    high (m, 2, d) of the bodies, maybe infinite. The consumer lowers `best`."""
-    for first in range(start, stop, step):
-        last = min(first + step, stop)
-        bounds = _bounds(points[first:last], boxes)
-        order = np.argsort(bounds, axis=1, kind="stable")
-        live = np.arange(last - first)
-        for turn in range(len(boxes)):
-            budget.check()
-            bodies = order[live, turn]
-            is_near = ~(bounds[live, bodies] > best[first + live])
-            live, bodies = live[is_near], bodies[is_near]
-            if not len(live):
-                break
-            by_body = np.argsort(bodies, kind="stable")
-            cuts = np.flatnonzero(np.diff(bodies[by_body], prepend=-1))
-            for group in np.split(by_body, cuts[1:]):
-                yield first + live[group], int(bodies[group[0]])
+def _settle(
+    points: FloatArray, nearest: Nearest, left: list[tuple[Any, Any]], scene: Placements, limit: float | None,
+    budget: Budget, workers: int | None,
+) -> int:  # fmt: skip
+    """Locate and measure what the kernel left; return how many distances integers decided."""
+    rows, bounds = (np.concatenate(parts) for parts in zip(*left))
+    are_held, features = rows[:, 2] == TO_LOCATE, nearest.features
+    owners, bodies = rows[are_held, 0], rows[are_held, 1]
+    are_inside = locate_given(points, owners, bodies, scene, budget, workers) == 1
+    for item, body in sorted(zip(owners[are_inside].tolist(), bodies[are_inside].tolist()), reverse=True):
+        if nearest.distance[item] > 0.0 or body < nearest.body[item]:
+            nearest.distance[item], nearest.body[item], nearest.point[item] = 0.0, body, points[item]
+            features.face[item], features.kind[item], features.numbers[item] = -1, NOWHERE, -1
+    n_exact = 0
+    for some, number in _turns(rows[~are_held], bounds[~are_held], nearest.distance, budget):
+        solid, pose = scene.placed(number)
+        query = PointQuery(read_only(points[some]), solid, pose, limit, limit is None, budget)
+        try:
+            query.fill(0, len(some), budget)
+        except EmptyGeometryError as error:  # of half-spaces, which no box tells
+            raise EmptyGeometryError(str(error).replace("solid", f"solids[{number}]", 1), ("solids", number)) from None
+        answer: Any = query.result()
+        n_exact += query.n_exact
+        if limit is not None:
+            nearest.distance[some[answer]] = 0.0
+            continue
+        best, body = nearest.distance[some], nearest.body[some]
+        is_less = (answer.distance < best) | ((answer.distance == best) & (number < body))
+        some = some[is_less]
+        nearest.body[some] = number
+        row: Any
+        for row, name in zip(
+            (nearest.distance, nearest.point, *features), ("distance", "point", "face", "kind", "index")
+        ):
+            row[some] = getattr(answer, name)[is_less]
+    return n_exact
 
 
-def _bounds(points: FloatArray, boxes: FloatArray) -> Any:
-    """Return lower bounds (n, m) on the distances of points from boxes: some 6 roundings are far below what is left
-    out; what overflows or is no number is 0."""
-    with np.errstate(all="ignore"):
-        square = np.zeros((len(points), len(boxes)))
-        for axis in range(points.shape[1]):
-            x = points[:, axis, None]
-            gap = np.maximum(np.maximum(boxes[None, :, 0, axis] - x, x - boxes[None, :, 1, axis]), 0.0)
-            square += gap * gap
-        bounds = np.sqrt(square) * _BELOW
-    return np.where(np.isfinite(bounds), bounds, 0.0)
+def _turns(rows: IntArray, bounds: FloatArray, best: FloatArray, budget: Budget) -> Iterator[tuple[IntArray, int]]:
+    """Yield (points, body): which points are to be measured from a body next, in the order of `bounds` for each point.
+    rows (n, 3): points and bodies. The consumer lowers `best`."""
+    order = np.lexsort((bounds, rows[:, 0]))
+    owners, bodies, bounds = rows[order, 0], rows[order, 1], bounds[order]
+    starts = np.flatnonzero(np.diff(owners, prepend=-1))
+    ranks = np.arange(len(owners)) - np.repeat(starts, np.diff(starts, append=len(owners)))
+    for rank in range(ranks.max(initial=-1) + 1):
+        budget.check()
+        live = np.flatnonzero((ranks == rank) & ~(bounds > best[owners]))
+        live = live[np.argsort(bodies[live], kind="stable")]
+        for group in np.split(live, np.flatnonzero(np.diff(bodies[live])) + 1) if len(live) else ():
+            yield owners[group], int(bodies[group[0]])
+
+
+def _name_late(nearest: Nearest, scene: Placements, still: _Rows, moved: _Rows) -> None:
+    """Name the features of meshes whose corners have no names; their rows have triangle and code as numbers."""
+    face, kind, numbers = nearest.features
+    late = np.flatnonzero((kind == OTHER) & (numbers[:, 1] >= 0))
+    for item, row in zip(late.tolist(), scene.rows_of(nearest.body[late]).tolist()):
+        n = len(still.rows)
+        measure = still.measures[row] if row < n else moved.measures[row - n]
+        codes = numbers[item : item + 1].copy()
+        numbers[item] = -1
+        measure.name(codes, Features(face[item : item + 1], kind[item : item + 1], numbers[item : item + 1]))
+
+
+def _kinds_of(solids: Sequence[Solid], budget: Budget) -> str:
+    """Return the types of solids, joined. Raises: as `check_measured`."""
+    for body, solid in enumerate(solids):
+        budget.check()
+        check_measured(solid, body)
+    return "+".join(sorted({solid.type for solid in solids}))
+
+
+def _rows_of(bodies: Any) -> _Rows:
+    return _Rows(bodies.solids, bodies.poses)
+
+
+_NO_ROWS: Final = _Rows((), ())

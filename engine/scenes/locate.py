@@ -19,6 +19,7 @@ from engine.containment.cells.build import MOST_FACES, sides_if_profitable
 from engine.containment.locate import locate_small_batch
 from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
+from engine.containment.methods.rational_locate import is_located
 from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, join_columns, run_chunks
@@ -27,7 +28,7 @@ from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.placements import Placements
 from engine.solids.mesh import Polyhedron
 from engine.solids.ragged import Ragged
-from engine.solids.registry import BodyKind
+from engine.solids.registry import BodyKind, row_of
 from engine.types import UNDECIDED, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 _BYTES: Final = 72
@@ -266,6 +267,19 @@ def _locate_exactly(
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
     return locations, Counts(sum(each.beyond for each in counts), sum(each.rational for each in counts))
+
+
+def locate_given(
+    points: FloatArray, owners: IntArray, bodies: IntArray, scene: Placements, budget: Budget, workers: int | None
+) -> Int8Array:
+    """Return the locations of pairs of point owners[i] and body bodies[i], a solid with an inside."""
+    are_many = len(owners) >= _FEWEST_FOR_TREES and all(is_located(row_of(solid)) for solid in scene.base.solids)
+    if are_many:
+        tables = scene.tables(budget)
+        rows = scene.rows_of(bodies)
+        slots = tables.slots[rows[tables.kinds[rows] == BodyKind.MESH]]
+        _build_trees(scene, np.bincount(slots, minlength=len(tables.sizes)), budget, workers)
+    return _locate_exactly(points, owners, bodies, scene, are_many, budget, workers)[0]
 
 
 def _build_trees(scene: Placements, query_counts: IntArray, budget: Budget, workers: int | None) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, Unpack, overload
+from typing import Any, Literal, Unpack, overload
 
+from engine.distance.clearance import checked_distance
 from engine.errors import EmptyGeometryError
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options
@@ -14,7 +15,7 @@ from engine.scenes.placements import Placements
 from engine.solids.accepted import PointsLike, PosesLike, SolidsLike
 from engine.solids.base import Immutable
 from engine.solids.checks import as_points
-from engine.types import Accuracy
+from engine.types import Accuracy, BoolArray
 
 
 class PointQueries(Immutable):
@@ -65,26 +66,31 @@ class PointQueries(Immutable):
         self,
         points: object,
         *,
+        within: float | None = None,
         workers: int | None = None,
         deadline: float | None = None,
         cancel: Cancel | None = None,
         progress: Progress | None = None,
         report: bool = False,
-    ) -> SceneDistances | tuple[SceneDistances, Accuracy]:
+    ) -> SceneDistances | BoolArray | tuple[SceneDistances | BoolArray, Accuracy]:
         """Find for each point the nearest body, its distance, and the nearest point; as `engine.distances`.
 
         Parameters
         ----------
         points, workers, deadline, cancel, progress, report
             As for `locate_scene`.
+        within : float, optional
+            A distance; the answer is then, for each point, whether a body is within it.
 
         Returns
         -------
         SceneDistances
-            With ``report=True`` a pair of it and an `Accuracy`.
+            With `within` an ndarray of bool, shape (n,); with ``report=True`` a pair of it and an `Accuracy`.
 
         Raises
         ------
+        UnsupportedSolidError
+            A body is an implicit solid or csg.
         EmptyGeometryError
             The scene has no body, or a body that counts has no point.
         EngineError
@@ -92,8 +98,8 @@ class PointQueries(Immutable):
 
         Notes
         -----
-        Bodies are closed sets: a point in one is 0 away. Accuracy is that of `engine.distances`. Cost: a distance from
-        the box of every body for each point, then `engine.distances` from those that may be the nearest.
+        Bodies are closed sets: a point in one is 0 away. Accuracy is that of `engine.distances`. Cost: O(log
+        bodies), and `engine.distances` from those few that may be the nearest; a convex body costs 10^-4 s and more.
 
         Examples
         --------
@@ -106,9 +112,10 @@ class PointQueries(Immutable):
         check_options(workers, progress, report=report)
         if self._dimension is None:
             raise EmptyGeometryError("a scene without bodies has no point to be near", ("bodies",))
+        limit = None if within is None else checked_distance(within, "within")
         array = as_points(points, self._dimension)
         with Budget(deadline, cancel) as budget:
-            answer = measure_all(array, self._placements, budget, workers, progress)
+            answer: Any = measure_all(array, self._placements, limit, budget, workers, progress)
         return answer if report else answer[0]
 
 
