@@ -295,10 +295,11 @@ def from_distances(measured: Any, accuracy: engine.Accuracy) -> DistancesRespons
 
 
 def from_scene_distances(measured: Any, accuracy: engine.Accuracy) -> SceneDistancesResponse:
-    """Return the answer of `scenes/{id}/distances`."""
-    return SceneDistancesResponse.made(
-        distances=measured.distance, bodies=measured.body, nearest=measured.point, accuracy=from_accuracy(accuracy)
-    )
+    """Return the answer of `scenes/{id}/distances`: bools, or `engine.SceneDistances`."""
+    columns = {"within": measured}
+    if isinstance(measured, engine.SceneDistances):
+        columns = {"distances": measured.distance, "bodies": measured.body, "nearest": measured.point}
+    return SceneDistancesResponse.made(**columns, accuracy=from_accuracy(accuracy))
 
 
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> CollideSceneResponse:

@@ -22,6 +22,7 @@ from service.schemas.bodies import (
     CollideSceneResponse,
     SceneCollideRequest,
     SceneContainsRequest,
+    SceneDistancesRequest,
     SceneModel,
     SceneSegmentsRequest,
     StoredSceneSummary,
@@ -296,11 +297,12 @@ def contains_stored_scene(scene_id: SceneId, question: SceneContainsRequest, cal
 
 
 @router.post("/v1/scenes/{scene_id}/distances", operation_id="distances_stored_scene", tags=["scenes"])
-def distances_stored_scene(scene_id: SceneId, question: SceneContainsRequest, call: CallOf) -> SceneDistancesResponse:
-    """Tell for each point the nearest body of a stored scene, how far it is, and the nearest point of it."""
+def distances_stored_scene(scene_id: SceneId, question: SceneDistancesRequest, call: CallOf) -> SceneDistancesResponse:
+    """Tell for each point the nearest body of a stored scene, how far it is, and the nearest point of it; or whether a
+    body is within a distance."""
     scene = questions.to_moved(call.store.get_scene(scene_id), question.moved, call)
     points = questions.to_items(question.points, scene.solids[0].dimension, call)
-    return answers.from_scene_distances(*call.compute(scene.distances, points))
+    return answers.from_scene_distances(*call.compute(scene.distances, points, within=question.within))
 
 
 @router.post("/v1/scenes/{scene_id}/collide", operation_id="collide_stored_scene", tags=["scenes"])
@@ -355,13 +357,20 @@ def contains_stored_scene_binary(scene_id: SceneId, question: Octets, call: Call
     "/v1/scenes/{scene_id}/binary/distances",
     operation_id="distances_stored_scene_binary",
     response_class=octets.Response,
-    responses=answers_with("Rows of 2 + dimension float64: the distance, the nearest body, its nearest point."),
+    responses=answers_with(
+        "Rows of 2 + dimension float64: the distance, the nearest body, its nearest point. With `within` N int8: 1 for "
+        "a body at most so far away, else 0."
+    ),
 )
-def distances_stored_scene_binary(scene_id: SceneId, question: Octets, call: CallOf, moved: MovedText = "[]") -> Any:
+def distances_stored_scene_binary(
+    scene_id: SceneId, question: Octets, call: CallOf, moved: MovedText = "[]", within: WithinQuery = _LEFT_OUT
+) -> Any:
     """Tell for each point, N x dimension little-endian float64, the nearest body of a stored scene."""
     scene = questions.to_moved(call.store.get_scene(scene_id), questions.read_moved(moved, call), call)
     points = octets.to_rows(question, (scene.solids[0].dimension,))
-    result, accuracy = call.compute(scene.distances, points)
+    result, accuracy = call.compute(scene.distances, points, within=within)
+    if within is not None:
+        return octets.answer(call, result.astype(np.int8), accuracy)
     return octets.answer(call, np.column_stack([result.distance, result.body, result.point]), accuracy)
 
 

@@ -248,6 +248,19 @@ class SceneContainsRequest(Schema):
     moved: Moved = optional(_MOVED)
 
 
+class SceneDistancesRequest(SceneContainsRequest):
+    """How far is the nearest body of the stored scene from each of these points?"""
+
+    model_config = with_example(
+        {"points": [[0.5, 0.5], [3.5, 1]], "moved": [{"body": 1, "pose": _STEP}]},
+        {"points": [[0.5, 0.5], [3.5, 1]], "within": 1},
+    )
+
+    within: Annotated[float, Numbers(minimum=0)] = optional(
+        "A distance: the answer is then for each point whether a body is at most so far away, decided exactly."
+    )
+
+
 class SceneCollideRequest(Schema):
     """Which bodies of the stored scene collide?"""
 

@@ -142,11 +142,12 @@ class DistancesResponse(Schema):
 
 
 class SceneDistancesResponse(Schema):
-    """Of each point the nearest body."""
+    """Of each point the nearest body, or whether one is near."""
 
-    distances: Doubles = Field(description="From the nearest body, each the nearest double; 0 within it.")
-    bodies: Indices = Field(description="That body; of several at one double the first.")
-    nearest: Positions = Field(description="The nearest point of it.")
+    distances: Doubles = optional("From the nearest body, each the nearest double; 0 within it.")
+    bodies: Indices = optional("That body; of several at one double the first.")
+    nearest: Positions = optional("The nearest point of it.")
+    within: Booleans = optional("With `within`, instead of the others.")
     accuracy: Accuracy
 
 

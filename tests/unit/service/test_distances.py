@@ -120,9 +120,13 @@ async def test_the_nearest_body_of_a_stored_scene(client: httpx.AsyncClient) -> 
     assert answer["distances"] == [1.0, 1.0]
     assert answer["bodies"] == [0, 1]
     assert answer["nearest"] == [[2, 1, 1], [8, 1, 1]]
-    answer = await client.post(
-        f"/v1/scenes/{name}/binary/distances", content=np.array(points, "<f8").tobytes(), headers=OCTETS
-    )
+    answer = (await client.post(f"/v1/scenes/{name}/distances", json={"points": points, "within": 0.5})).json()
+    assert answer["within"] == [False, False]
+    assert not {"distances", "bodies", "nearest"} & answer.keys()
+    raw: dict[str, Any] = {"content": np.array(points, "<f8").tobytes(), "headers": OCTETS}
+    answer = await client.post(f"/v1/scenes/{name}/binary/distances", params={"within": 1}, **raw)
+    assert list(answer.content) == [1, 1]
+    answer = await client.post(f"/v1/scenes/{name}/binary/distances", **raw)
     assert np.frombuffer(answer.content).reshape(-1, 5).tolist() == [[1, 0, 2, 1, 1], [1, 1, 8, 1, 1]]
     moved = [{"body": 1, "pose": {"rotation": np.eye(3).tolist(), "translation": [-5, 0, 0]}}]
     answer = (await client.post(f"/v1/scenes/{name}/distances", json={"points": points, "moved": moved})).json()
