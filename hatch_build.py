@@ -35,8 +35,7 @@ class WheelLayout(BuildHookInterface):  # type: ignore[type-arg, misc, unused-ig
         self.room = room
         renamed = runpy.run_path(str(root / "exact_geometry" / "_renaming.py"))["renamed"]
         for name in ("engine", "service", "benchmarks", "exact_geometry"):
-            ignored = shutil.ignore_patterns("__pycache__", "*.pyc", "kernels", "results", "filed", "*.md")
-            shutil.copytree(root / name, room / name, ignore=ignored)
+            shutil.copytree(root / name, room / name, ignore=_left_out)
             for file in (room / name).rglob("*.py"):
                 file.write_text(renamed(file.read_text("utf-8")), "utf-8")
         (room / "names.pth").write_text("import _exact_geometry_names\n")
@@ -61,6 +60,18 @@ class WheelLayout(BuildHookInterface):  # type: ignore[type-arg, misc, unused-ig
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Remove the temporary folder."""
         shutil.rmtree(getattr(self, "room", "no such folder"), ignore_errors=True)
+
+
+def _left_out(folder: str, names: list[str]) -> set[str]:
+    """Return what of a folder is not for the wheel: of `benchmarks` all that `audit` does not need, which compares
+    checkouts, makes the report or loads a service."""
+    left_out = shutil.ignore_patterns("__pycache__", "*.pyc", "kernels", "results", "filed", "*.md")(folder, names)
+    if Path(folder).name == "answers":
+        return set(names) - {"__init__.py", "draws.py", "shapes.py"}
+    if Path(folder).name == "benchmarks":
+        of_checkouts = ("__main__", "checkouts", "cliffs", "cores", "load", "report", "soak", "wire")
+        left_out |= {f"{name}.py" for name in of_checkouts}
+    return left_out
 
 
 def _compiled(root: Path, cpu: str, folder: Path) -> Path:

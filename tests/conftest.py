@@ -12,7 +12,7 @@ import pytest
 
 import engine
 from engine import warmup
-from engine.compiling import jit, kernel_cache
+from engine.compiling import jit, kernel_cache, sources
 from engine.compiling.cold_start import fill_cache, has_all
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,7 +73,7 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source = seed if seed is not None and has_all(seed, "engine.warmup") else kernel_cache.cache_folder()
     assert source is not None
     modules = {name for name in (kernel.__module__ for kernel in jit.KERNELS) if name.startswith("engine.")}
-    for digest in map(kernel_cache.source_digest, modules | {"engine.warmup"}):
+    for digest in map(sources.source_digest, modules | {"engine.warmup"}):
         if (source / digest).exists():
             shutil.copytree(source / digest, folder / digest, ignore=shutil.ignore_patterns("lock"))
     kernel_cache.seal(folder)

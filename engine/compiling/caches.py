@@ -19,16 +19,8 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from engine.compiling import require
-from engine.compiling.kernel_cache import (
-    COMPLETE,
-    as_imported,
-    cache_folder,
-    matches_its_source,
-    read_cached,
-    source_digest,
-    warn_of_compiling,
-    write_cached,
-)
+from engine.compiling.kernel_cache import COMPLETE, cache_folder, read_cached, warn_of_compiling, write_cached
+from engine.compiling.sources import as_imported, matches_its_source, source_digest
 
 require(
     {

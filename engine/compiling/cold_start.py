@@ -14,7 +14,8 @@ from pathlib import Path
 from numba import config as numba_config
 
 from engine.compiling.jit import completion_markers
-from engine.compiling.kernel_cache import cache_folder, matches_its_source, seed, source_digest
+from engine.compiling.kernel_cache import cache_folder, seed
+from engine.compiling.sources import matches_its_source, source_digest
 
 try:
     import fcntl

@@ -118,12 +118,13 @@ class _KernelLibrary(_Library):
 
         What is linked in becomes private: a function with one call is inlined whatever its size, and an unused
         argument, such as most arrays of a table, is not passed. It gets a name of its own, since the linker would take
-        it for stock numba's version of the same function, and finds no address.
+        it for stock numba's version of the same function, and finds no address; a short one, since names that spell out
+        the types of all arguments are a third of an object file.
         """
-        for function in self._final_module.functions:
+        for number, function in enumerate(self._final_module.functions):
             if function.linkage == llvmlite.binding.Linkage.linkonce_odr:
                 function.linkage = "internal"
-                function.name += ".inner"
+                function.name = f"inner.{number}"
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
 

@@ -109,3 +109,21 @@ def test_a_pipe_in_the_cache_is_no_file(tmp_path: Path, monkeypatch: pytest.Monk
         assert kernel_cache.read_cached("a kernel") == b"compiled"
     finally:
         kernel_cache.cache_folder.cache_clear()
+
+
+def test_a_seed_is_packed_and_read_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel_cache, "_candidates", lambda: iter([tmp_path]))
+    kernel_cache.cache_folder.cache_clear()
+    try:
+        name, code = "digest/kernel-key.nbc", b"machine code " * 1000
+        kernel_cache.write_cached(name, code)
+        kernel_cache.seal(tmp_path)
+        packed = (tmp_path / name).read_bytes()
+        assert len(packed) < 1000
+        kernel_cache.seal(tmp_path)  # packed once only
+        assert (tmp_path / name).read_bytes() == packed
+        assert kernel_cache.read_cached(name) == code
+        (tmp_path / name).write_bytes(packed[:-9] + bytes(9))
+        assert kernel_cache.read_cached(name) is None
+    finally:
+        kernel_cache.cache_folder.cache_clear()

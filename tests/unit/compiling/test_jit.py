@@ -20,7 +20,7 @@ import pytest
 from numba import config as numba_config
 
 import engine
-from engine.compiling import jit, kernel_cache
+from engine.compiling import jit, kernel_cache, sources
 from exact_geometry._renaming import renamed
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -232,14 +232,12 @@ def test_where_new_files_are_the_group_s_to_write_the_cache_is_ours_all_the_same
 
 def test_the_digest_covers_what_is_imported_and_nothing_else(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def digests() -> tuple[str, str]:
-        kernel_cache.read_source.cache_clear()
-        kernel_cache._AT_IMPORT.clear()
-        return kernel_cache.source_digest.__wrapped__("engine.work"), kernel_cache.source_digest.__wrapped__(
-            "engine.deep.helper"
-        )
+        sources.read_source.cache_clear()
+        sources._AT_IMPORT.clear()
+        return sources.source_digest.__wrapped__("engine.work"), sources.source_digest.__wrapped__("engine.deep.helper")
 
-    monkeypatch.setattr(kernel_cache, "_ROOT", project / "engine")
-    monkeypatch.setattr(kernel_cache, "_AT_IMPORT", {})
+    monkeypatch.setattr(sources, "_ROOT", project / "engine")
+    monkeypatch.setattr(sources, "_AT_IMPORT", {})
     before = digests()
     (project / "engine" / "other.py").write_text("x = 1\n")
     assert digests() == before
@@ -251,18 +249,18 @@ def test_the_digest_covers_what_is_imported_and_nothing_else(project: Path, monk
     last = digests()
     assert last[0] != after[0]
     assert last[1] != after[1]
-    kernel_cache.read_source.cache_clear()
+    sources.read_source.cache_clear()
 
 
 def test_a_kernel_elsewhere_is_kept_under_its_own_source_and_what_that_imports() -> None:
     """Or a test would be answered by what was compiled before the engine changed."""
-    digest, named = kernel_cache.read_source(__name__)
+    digest, named = sources.read_source(__name__)
     assert digest == hashlib.sha256(Path(__file__).read_bytes()).digest()
     assert "engine.compiling.kernel_cache" in named
 
 
 def test_every_import_form_is_read() -> None:
-    found = kernel_cache.read_source("engine.predicates.orientation")[1]
+    found = sources.read_source("engine.predicates.orientation")[1]
     assert {
         "engine.compiling.jit",
         "engine.types",
