@@ -85,14 +85,17 @@ boxes are sorted by their first coordinate, for a sweep.
 """
 
 
-def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: FlagArray, block: int = BLOCK) -> Iterator[IntArray]:
+def pairs_of_boxes(
+    low: FloatArray, high: FloatArray, flag: FlagArray, block: int = BLOCK, n_left: int | None = None
+) -> Iterator[IntArray]:
     """Yield the pairs ``(n_pairs, 2)``, first < second, of closed boxes ``(n, d)`` that have a common point, in blocks.
 
+    n_left: if given, only pairs of one of the first `n_left` boxes and one of the others.
     Each block is sorted, and has about `block` pairs, or all pairs of one box if these are more; a later block may have
     smaller indices. Stops early, with an invalid block, once `flag` (1,) uint8 is set: the caller checks it after each
     block.
     """
-    for keys in _keys_of_pairs(low, high, flag, block):
+    for keys in _keys_of_pairs(low, high, flag, block, n_left):
         yield np.stack([keys // len(low), keys % len(low)], axis=1)
 
 
@@ -112,7 +115,9 @@ def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> Int
     return pairs
 
 
-def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: FlagArray, block: int) -> Iterator[IntArray]:
+def _keys_of_pairs(
+    low: FloatArray, high: FloatArray, flag: FlagArray, block: int, n_left: int | None = None
+) -> Iterator[IntArray]:
     """Yield the pairs of `pairs_of_boxes` in sorted blocks, each pair as the key first * n + second."""
     n_boxes = len(low)
     grid = _sweep_grid(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
@@ -120,7 +125,7 @@ def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: FlagArray, block: in
     start, enough = 0, max(block, 1)
     keys = np.empty(min(enough, n_boxes * n_boxes // 2) + n_boxes, np.int64)  # one box meets fewer than there are
     while start < n_boxes:  # bound: start grows
-        n_pairs, start = entry_of(_collect_pairs)(grid, start, enough, keys, flag)
+        n_pairs, start = entry_of(_collect_pairs)(grid, start, enough, -1 if n_left is None else n_left, keys, flag)
         if n_pairs:
             yield np.sort(keys[:n_pairs])
 
@@ -247,22 +252,27 @@ def _boxes_intersect(boxes: FloatArray, box: int, other: int) -> bool:
 
 @inline
 def _append_run(
-    boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, keys: IntArray, n_pairs: int
+    boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, n_left: int, keys: IntArray, n_pairs: int
 ) -> int:
     """Append to keys those pairs of `box` with boxes start .. stop - 1 that intersect, as first * n_boxes + second in
-    input numbers; return the new number of keys. The entry after the last key may be overwritten."""
+    input numbers; return the new number of keys. The entry after the last key may be overwritten. n_left: only
+    pairs with one number below it and one not; -1: all pairs."""
     n_boxes, own = numbers.shape[0], numbers[box]
+    is_left = own < n_left or n_left < 0
     for other in range(start, stop):
         number = numbers[other]
         keys[n_pairs] = min(own, number) * n_boxes + max(own, number)
-        n_pairs += 1 if _boxes_intersect(boxes, box, other) else 0
+        n_pairs += 1 if _boxes_intersect(boxes, box, other) & ((number < n_left) != is_left) else 0
     return n_pairs
 
 
 @kernel
-def _collect_pairs(grid: CornerGrid, start: int, enough: int, keys: IntArray, flag: FlagArray) -> tuple[int, int]:
+def _collect_pairs(
+    grid: CornerGrid, start: int, enough: int, n_left: int, keys: IntArray, flag: FlagArray
+) -> tuple[int, int]:
     """Write keys first * n + second of the pairs of boxes from index `start` of the grid on, until there are at least
-    `enough` keys. Returns the number of keys, and the index to go on from; (0, n) if the flag is set."""
+    `enough` keys. n_left: as in `_append_run`. Returns the number of keys, and the index to go on from; (0, n) if
+    the flag is set."""
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer
     n_boxes, n_small, n_pairs = numbers.shape[0], int(starts[-1]), 0
     for box in range(start, n_boxes):
@@ -275,14 +285,14 @@ def _collect_pairs(grid: CornerGrid, start: int, enough: int, keys: IntArray, fl
             stop = n_boxes if row > 0 else box + 1
             while stop < n_boxes and boxes[stop, 0] <= boxes[box, 3]:
                 stop += 1
-            n_pairs = _append_run(boxes, numbers, box, box + 1, stop, keys, n_pairs)
+            n_pairs = _append_run(boxes, numbers, box, box + 1, stop, n_left, keys, n_pairs)
             continue
-        n_pairs = _append_run(boxes, numbers, box, box + 1, starts[cell + 2], keys, n_pairs)
+        n_pairs = _append_run(boxes, numbers, box, box + 1, starts[cell + 2], n_left, keys, n_pairs)
         cell += row
-        n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_pairs)
+        n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], n_left, keys, n_pairs)
         cell += layer - 2 * row
         for _ in range(3):
-            n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_pairs)
+            n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], n_left, keys, n_pairs)
             cell += row
-        n_pairs = _append_run(boxes, numbers, box, n_small, n_boxes, keys, n_pairs)
+        n_pairs = _append_run(boxes, numbers, box, n_small, n_boxes, n_left, keys, n_pairs)
     return n_pairs, n_boxes

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.bounding.box_grid import pairs_of_boxes
+from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.errors import InvalidInputError
 from engine.polygon_overlay.grid import grid_of
 from engine.running.budget import Budget, Cancel
@@ -49,13 +49,15 @@ class Limits:
         """Return a budget of the remaining time."""
         return Budget(self.options()["deadline"], self._cancel)
 
-    def pairs_of_boxes(self, low: FloatArray, high: FloatArray, is_chosen: Any = None, n_bytes: int = 16) -> IntArray:
+    def pairs_of_boxes(
+        self, low: FloatArray, high: FloatArray, is_chosen: Any = None, n_left: int | None = None, n_bytes: int = 16
+    ) -> IntArray:
         """Return pairs (m, 2), first < second, sorted, of closed boxes low, high (n, d) that intersect.
-        is_chosen(pairs): optional, (k,) bool, which of a block to return; n_bytes: memory charged to the budget for a
-        pair."""
+        is_chosen(pairs): optional, (k,) bool, which of a block to return. n_left: if given, only pairs of one of the
+        first n_left boxes and one of the others. n_bytes: memory charged to the budget for a pair."""
         blocks = [np.zeros((0, 2), np.int64)]
         with self.budget() as budget:
-            for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+            for pairs in pairs_of_boxes(low, high, budget.flag, BLOCK, n_left) if len(low) else ():
                 budget.check()
                 blocks.append(pairs if is_chosen is None else pairs[is_chosen(pairs)])
                 budget.take(n_bytes * len(blocks[-1]))

@@ -108,7 +108,7 @@ def _clip_areas(layer: MixedLayer, pieces: PolygonArrays, limits: Limits, with_t
             own, inside = np.intersect1d(own, cut), np.intersect1d(own, np.setdiff1d(inside, cut))
     n, ends = len(own), zip(arrays.boxes(own), pieces.boxes(np.arange(len(pieces.polygon_offsets) - 1)))
     low, high = (np.concatenate(each) for each in ends)
-    first, second = limits.pairs_of_boxes(low, high, lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n)).T
+    first, second = limits.pairs_of_boxes(low, high, None, n).T
     counts = np.bincount(first, minlength=n)
     is_one = counts[first] == 1
     several = own[counts > 1]

@@ -146,9 +146,7 @@ def candidate_pairs(
     low, high = (np.concatenate(each) for each in zip(*corners))
     numbers = np.concatenate([filled[0], filled[1] + len(left)])
     n = len(filled[0])
-    both = limits.pairs_of_boxes(
-        low, high, None if with_rivals else lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n), _ROW_BYTES
-    )
+    both = limits.pairs_of_boxes(low, high, None, None if with_rivals else n, _ROW_BYTES)
     first, second = n > both.T
     pairs = numbers[both]
     rivals = pairs[second], pairs[~first] - len(left)

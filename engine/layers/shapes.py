@@ -204,7 +204,7 @@ def pairs_between(left: Shapes, right: Shapes, reach: Any, limits: Limits) -> In
     if (grown > 0.0).any():  # rounded outward
         low, high = np.nextafter(low - grown, -np.inf), np.nextafter(high + grown, np.inf)
     n, low, high = len(numbers), np.concatenate([low, their_low]), np.concatenate([high, their_high])
-    both = limits.pairs_of_boxes(low, high, lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n))
+    both = limits.pairs_of_boxes(low, high, None, n)
     return np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
 
 

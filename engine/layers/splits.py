@@ -26,7 +26,7 @@ def split_rows(layer: MixedLayer, lines: MixedLayer, limits: Limits) -> LayerRow
     filled = np.flatnonzero(arrays.sizes())
     low, high = arrays.boxes(filled)
     n, ends = len(filled), (np.concatenate([low, segments.min(axis=1)]), np.concatenate([high, segments.max(axis=1)]))
-    pairs = limits.pairs_of_boxes(*ends, lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n))
+    pairs = limits.pairs_of_boxes(*ends, None, n)
     offsets = np.searchsorted(pairs[:, 0], np.arange(n + 1))
     is_met = np.diff(offsets) > 0
     whole = PolygonSelection(arrays, filled[~is_met])
