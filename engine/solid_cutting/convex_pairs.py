@@ -185,6 +185,16 @@ def _find_sides(body: Body, planes: FloatArray) -> bool:
 
 
 @inline
+def _is_within(plane: FloatArray, polygon: FloatArray, n: int) -> bool:
+    """Return whether all corners of a polygon are certainly inside a plane."""
+    for k in range(n):
+        h = plane[_VALUE] - (plane[0] * polygon[k, 0] + plane[1] * polygon[k, 1] + plane[2] * polygon[k, 2])
+        if not h > plane[_ROUGH]:
+            return False
+    return True
+
+
+@inline
 def _cut(plane: FloatArray, polygon: FloatArray, n: int, made: FloatArray, extent: float) -> tuple[int, float]:
     """Write what a plane leaves of a polygon of n corners to `made`; return how many corners it has, -1 for a polygon
     that may be in the plane, and a bound on twice the area that is wrong."""
@@ -260,6 +270,15 @@ def _add_faces(
         _add_cone(polygon, size, axis, height, size * rounding, share, sums, 3)
         wrong, n_left = 0.0, size
         for item in range(n_others):
+            n_out = 0
+            for k in range(size):
+                n_out += own.sides[item, corners[start + k]] < 0.0
+            if n_out == size:
+                n_left = 0
+                break
+        if n_left == 0:
+            continue
+        for item in range(n_others):
             theirs = other.planes[item]
             if plane[_AXIS] >= 0.0 and plane[_AXIS] == theirs[_AXIS]:
                 value, _ = _value(theirs, placed, corners[start])
@@ -267,15 +286,7 @@ def _add_faces(
                     n_left = 0
                     break
                 continue
-            n_in = n_out = 0
-            for k in range(size):
-                side = own.sides[item, corners[start + k]]
-                n_in += side > 0.0
-                n_out += side < 0.0
-            if n_out == size:
-                n_left = 0
-                break
-            if n_in == size or n_left < 3:
+            if n_left < 3 or _is_within(theirs, polygon, n_left):
                 continue
             n_left, strip = _cut(theirs, polygon, n_left, made, extent)
             if n_left < 0:

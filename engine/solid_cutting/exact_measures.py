@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import cmp_to_key
 from itertools import pairwise
-from math import isqrt, lcm
+from math import isqrt, lcm, prod
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -210,21 +210,24 @@ def exact_faces(vertices: FloatArray, faces: IntArray) -> ExactMesh:
     return exact_mesh(vertices[used].tolist(), map(tuple, flat.reshape(-1, 3).tolist()))
 
 
-def sides_of(solid: Aabb) -> list[Fraction]:
-    """Return the exact lengths of the sides of a box."""
-    return [Fraction(b) - Fraction(a) for a, b in zip(solid.min.tolist(), solid.max.tolist())]
+def sides_of(*boxes: Aabb) -> tuple[list[int], int]:
+    """Return the lengths of the sides of what boxes have in common, at least 0, times a number, and that number."""
+    k = boxes[0].dimension
+    *numbers, w = scaled_integers([*(x for box in boxes for end in (box.min, box.max) for x in end.tolist()), 1])
+    ends = [numbers[first : first + k] for first in range(0, len(numbers), k)]
+    return [max(0, min(high) - max(low)) for low, high in zip(zip(*ends[::2]), zip(*ends[1::2]))], w
 
 
-def product(factors: list[Fraction]) -> Fraction:
-    """Return the product of two or three numbers."""
-    return factors[0] * factors[1] * (factors[2] if len(factors) == 3 else 1)
+def volume_of_boxes(*boxes: Aabb) -> Fraction:
+    """Return the exact volume, in the plane the area, of what boxes have in common."""
+    sides, w = sides_of(*boxes)
+    return Fraction(prod(sides), w ** len(sides))
 
 
 def _area_of_box(solid: Aabb, _: Budget) -> tuple[float, bool]:
-    sides = sides_of(solid)
-    if len(sides) == 2:
-        return nearest_float(product(sides)), True
-    return nearest_float(2 * sum(sides[k] * sides[k - 1] for k in range(3))), True
+    sides, w = sides_of(solid)
+    total = prod(sides) if len(sides) == 2 else 2 * sum(sides[k] * sides[k - 1] for k in range(3))
+    return nearest_float(Fraction(total, w * w)), True
 
 
 def _middle_of_box(solid: Aabb, _: Budget) -> tuple[FloatArray, bool]:
@@ -277,7 +280,7 @@ def _as_polygon(solid: Triangle, what: str, budget: Budget) -> tuple[Any, bool]:
     raise WrongDimensionError("a triangle of space has no volume, so no centroid; average its vertices", ("solid",))
 
 
-BOX: Final = Measures(lambda solid, _: (nearest_float(product(sides_of(solid))), True), _area_of_box, _middle_of_box)
+BOX: Final = Measures(lambda solid, _: (nearest_float(volume_of_boxes(solid)), True), _area_of_box, _middle_of_box)
 BALL: Final = Measures(
     lambda solid, _: _of_ball(solid, 3, Fraction(4, 3)),
     lambda solid, _: _of_ball(solid, 2, Fraction(4)) if solid.dimension == 3 else _of_ball(solid, 2, Fraction(1)),

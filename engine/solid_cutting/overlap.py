@@ -17,7 +17,7 @@ from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.cut import cut_by_planes
 from engine.solid_cutting.cut_measures import narrowed, volume_between, volume_in_fractions, volume_of_cut
-from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces, product, sides_of
+from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces, volume_of_boxes
 from engine.solid_cutting.overlap_batches import (
     check_same_length,
     extremes,
@@ -199,11 +199,8 @@ def _of_pair(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, bu
     if first.dimension == 2 and any(isinstance(each, (Polygon, Triangle)) for each in (first, second)):
         return overlap_of_polygons(first, second, moves, is_ratio, budget), False
     if isinstance(first, Aabb) and isinstance(second, Aabb) and moves == (None, None):
-        ends = zip(first.min.tolist(), second.min.tolist(), first.max.tolist(), second.max.tolist())
-        sides = [max(Fraction(0), Fraction(min(c, d)) - Fraction(max(a, b))) for a, b, c, d in ends]
-        both = product(sides)
-        own = [product(sides_of(each)) for each in (first, second)]
-        return ratio_of([both, *own]) if is_ratio else nearest_float(both), True
+        both = volume_of_boxes(first, second)
+        return ratio_of([both, *map(volume_of_boxes, (first, second))]) if is_ratio else nearest_float(both), True
     rows = [_rows_of(each, move, budget) for each, move in zip((first, second), moves)]
     if rows[0] is not None and rows[1] is not None:
         both = _volume_within(rows[0] + rows[1], budget)
@@ -253,7 +250,7 @@ def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
     """Return the exact volume of a convex solid under a pose."""
     factor = _determinant(pose)
     if isinstance(solid, Aabb):
-        return factor * product(sides_of(solid))
+        return factor * volume_of_boxes(solid)
     own: Rows = [[Fraction(x) for x in row] for row in plan_of(solid, budget.check).rows]
     return factor * solid.prepared("exact_volume", lambda: _volume_within(own, budget), budget.check)
 

@@ -42,9 +42,10 @@ from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import FloatArray, IntArray, read_only
 
-_QUADS: Final = BOX_TRIANGLES.reshape(6, 6)[:, [0, 1, 2, 5]]
+_QUADS: Final = BOX_TRIANGLES.reshape(6, 6)[:, [0, 1, 2, 5]].ravel()
 """Faces of a box, corner k of which is at the high end of axis a if bit a of k is set."""
-_BITS: Final = (np.arange(8)[:, None] >> np.arange(3)) & 1
+_QUAD_ENDS: Final = np.arange(0, 25, 4)
+_HIGH: Final = np.arange(8)[:, None] >> np.arange(3) & 1
 _LARGEST: Final = 1 << 16
 """Faces times corners of a pair up to which tables are made of it."""
 
@@ -63,8 +64,6 @@ def of_bodies(
     """Return the common volumes, or ratios, of those pairs of solids that are convex bodies of space, proven to be the
     nearest doubles, NaN of others."""
     values = np.full(len(pairs), np.nan)
-    if len(pairs) == 1 and poses[0] is None and poses[1] is None and all(isinstance(solid, Aabb) for solid in pairs[0]):
-        return values  # in closed form sooner
     unique = {id(solid): solid for pair in pairs for solid in pair}
     boxes = [solid for solid in unique.values() if isinstance(solid, Aabb) and solid.dimension == 3]
     numbers = {id(box): number for number, box in enumerate(boxes)}
@@ -76,29 +75,28 @@ def of_bodies(
             if body is not None:
                 numbers[key] = len(boxes) + len(bodies)
                 bodies.append(body)
-    ends = [np.array([getattr(box, name) for box in boxes]).reshape(-1, 1, 3) for name in ("min", "max")]
-    has_volume = np.append((ends[0] < ends[1]).all(axis=(1, 2)), np.ones(len(bodies), np.bool_))
     which = np.array([(numbers.get(id(one), -1), numbers.get(id(other), -1)) for one, other in pairs], np.int64)
-    rows: IntArray = np.flatnonzero((which >= 0).all(axis=1) & has_volume[which].all(axis=1)) if numbers else which[:0]
+    rows: IntArray = np.flatnonzero((which >= 0).all(axis=1))
     if not len(rows):
         return values
-    n = len(boxes)
-    points = [np.concatenate([np.where(_BITS, ends[1], ends[0]), np.zeros((n, 8, 3))], axis=2).reshape(-1, 6)]
-    points += [body.points for body in bodies]
-    lengths = np.append(np.full(n, _QUADS.size), [len(body.corners) for body in bodies]).astype(np.int64)
-    first_corners = np.cumsum(lengths) - lengths
-    faces = [np.arange(4, 24 * n + 1, 4), *(body.ends + at for body, at in zip(bodies, first_corners[n:].tolist()))]
-    sizes = np.array([(8, 6)] * n + [(len(body.points), len(body.ends)) for body in bodies])
-    most, most_faces = sizes.max(axis=0).tolist()
+    n, n_corners, n_faces = len(boxes), 8 * len(boxes), 6
+    table, corners, ends = [(8 * k, 0, 8, 6) for k in range(n)], [_QUADS], [_QUAD_ENDS]
+    for body in bodies:
+        table.append((n_corners, n_faces, len(body.points), len(body.ends)))
+        corners.append(body.corners)
+        ends.append(body.ends + int(ends[-1][-1]))
+        n_corners, n_faces = n_corners + len(body.points), n_faces + len(body.ends)
+    points = np.zeros((n_corners, 6))
+    if n:
+        points[: 8 * n, :3] = np.array([[box.min, box.max] for box in boxes])[:, _HIGH, range(3)].reshape(-1, 3)
+    for body, row in zip(bodies, table[n:]):
+        points[row[0] : row[0] + row[2]] = body.points
+    sizes = np.array(table, np.int64)
+    most, most_faces = sizes[:, 2:].max(axis=0).tolist()
     if most * most_faces > _LARGEST:
         return values
-    moves = np.stack([_numbers_of(pose, pairs[int(rows[0])][k], k) for k, pose in enumerate(poses)])
-    tables = (
-        read_only(np.concatenate(points)),
-        read_only(np.concatenate([np.tile(_QUADS.ravel(), n), *(body.corners for body in bodies)])),
-        read_only(np.concatenate([np.zeros(1, np.int64), *faces])),
-        read_only(np.concatenate([np.cumsum(sizes, axis=0) - sizes, sizes], axis=1)),
-    )
+    moves = np.array([_numbers_of(pose, pairs[int(rows[0])][k], k) for k, pose in enumerate(poses)])
+    tables = [read_only(each) for each in (points, np.concatenate(corners), np.concatenate(ends), sizes)]
     some = read_only(which[rows])
     made = np.full(len(rows), np.nan)
 
@@ -113,12 +111,10 @@ def of_bodies(
     return values
 
 
-def _numbers_of(pose: Any, solid: Solid, k: int) -> FloatArray:
+def _numbers_of(pose: Any, solid: Solid, k: int) -> list[float]:
     """Return the numbers of a pose, and 1.0, or zeros for none."""
     move = posed(pose, solid, ("first_pose", "second_pose")[k])
-    if move is None:
-        return np.zeros(13)
-    return np.concatenate([move.rotation.ravel(), move.translation, [1.0]])
+    return [0.0] * 13 if move is None else [*move.rotation.ravel().tolist(), *move.translation.tolist(), 1.0]
 
 
 def _body_of(solid: Convex | Polyhedron, budget: Budget) -> Body | None:
