@@ -16,7 +16,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cmp_to_key
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from engine.errors import TooComplexError
 from engine.predicates.rational import largest_axis, sign_of
 from engine.running.budget import Budget
 from engine.solid_cutting.ears import bridge_of, clip_ears
-from engine.solid_cutting.face_cuts import find_turned
+from engine.solid_cutting.face_cuts import find_turned, turn_rings
 from engine.solid_cutting.plane_cut import Plane, Points, without_repeats
 from engine.solid_cutting.shells import matched
 from engine.types import FloatArray, IntArray, read_only
@@ -75,7 +75,7 @@ def seen(points: Points, plane: Plane) -> Seen:
 
 
 def rings_of(view: Seen, chain: IntArray, budget: Budget) -> list[Ring]:
-    """Return the rings of a chain of directed sides (k, 2), each simple in its points, from its leftmost point on."""
+    """Return the rings of a chain of directed sides (k, 2), each simple in its points."""
     if not len(chain):
         return []
     order = np.argsort(chain[:, 0])
@@ -95,7 +95,7 @@ def rings_of(view: Seen, chain: IntArray, budget: Budget) -> list[Ring]:
             side = after[side]
         if walk:
             rings += [walk] if is_simple else _parted(walk)
-    return [_from_leftmost(view, ring) for ring in rings if len(ring) > 2]  # others run there and back
+    return [ring for ring in rings if len(ring) > 2]  # others run there and back
 
 
 def _parted(walk: Ring) -> list[Ring]:
@@ -134,12 +134,6 @@ def _balanced(view: Seen, chain: IntArray, budget: Budget) -> tuple[IntArray, li
     return ends, after
 
 
-def _from_leftmost(view: Seen, ring: Ring) -> Ring:
-    places = view.doubles(ring)
-    first = int(np.lexsort((places[:, 1], places[:, 0]))[0])
-    return ring[first:] + ring[:first]
-
-
 def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoing: list[int]) -> list[tuple[int, int]]:
     """Return pairs (incoming, outgoing) of sides at a point."""
     x, y = view.exact(point)
@@ -155,13 +149,14 @@ def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoi
 
 
 def areas_of(view: Seen, rings: list[Ring], budget: Budget, is_exact: bool = False) -> tuple[list[Area], list[Ring]]:
-    """Return rings as polygons with holes, and those without area. is_exact: decide with fractions which shell has a
-    hole."""
-    signs = [_sign_of(view, ring) for ring in rings]
+    """Return rings as polygons with holes, and those without area, each from its leftmost point on. is_exact: decide
+    with fractions which shell has a hole."""
+    rings, signs = oriented(view, rings)
     shells = [ring for ring, sign in zip(rings, signs) if sign > 0]
     areas = [Area(shell, []) for shell in shells]
     holes = [ring for ring, sign in zip(rings, signs) if sign < 0]
-    boxes = [np.stack([places.min(axis=0), places.max(axis=0)]) for places in map(view.doubles, shells)]
+    some = map(view.doubles, shells if holes else [])
+    boxes = [np.stack([places.min(axis=0), places.max(axis=0)]) for places in some]
     for hole in holes:
         budget.check()
         low, high = (pick(view.doubles(hole), axis=0) for pick in (np.min, np.max))  # rounding is monotonic
@@ -171,18 +166,17 @@ def areas_of(view: Seen, rings: list[Ring], budget: Budget, is_exact: bool = Fal
     return areas, [ring for ring, sign in zip(rings, signs) if sign == 0]
 
 
-def _sign_of(view: Seen, ring: Ring) -> int:
-    """Return the exact sign of the area of a ring."""
-    places = view.doubles(ring)
-    off = places - places[0]
-    terms = off[:, 0] * np.roll(off[:, 1], -1) - off[:, 1] * np.roll(off[:, 0], -1)
-    span, size = float(np.abs(off).max()), float(np.abs(places).max())
-    bound = len(ring) * 2.0**-49 * (span * size + span * span) + 2.0**-1000
-    total = float(terms.sum())
-    if abs(total) > bound and np.isfinite(bound):
-        return 1 if total > 0 else -1
-    corners = [view.exact(number) for number in ring]
-    return sign_of(sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1])))
+def oriented(view: Seen, rings: list[Ring]) -> tuple[list[Ring], list[int]]:
+    """Return rings, each from its leftmost point on, the lowest of these, and the exact signs of their areas."""
+    sizes, numbers = np.array([len(ring) for ring in rings], np.int64), np.array([*chain(*rings)], np.int64)
+    ends, firsts, signs = np.cumsum(sizes), np.empty(len(rings), np.int64), np.empty(len(rings), np.int8)
+    with np.errstate(all="ignore"):
+        entry_of(turn_rings)(view.points.rounded(numbers), *view.axes, ends, firsts, signs)
+    made = [ring[k:] + ring[:k] for ring, k in zip(rings, (firsts - ends + sizes).tolist())]
+    for number in np.flatnonzero(signs == 0).tolist():
+        corners = [view.exact(point) for point in rings[number]]
+        signs[number] = sign_of(sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1])))
+    return made, signs.tolist()
 
 
 def _holder(view: Seen, hole: Ring, shells: list[Ring], is_exact: bool) -> int:
@@ -281,11 +275,11 @@ def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntA
     span = float(np.ptp(places, axis=0).max())
     slack = 2.0**-49 * (view.points.size + span) * span  # positions are off by 2^-53 of the largest coordinate
     made: IntArray | None = _ears_of(np.ascontiguousarray(places.T), slack, budget)
-    if made is not None and (turned := _turned_in(view, corners[made], budget)):
+    if made is not None and (turned := _turned_in(view, corners, made, budget)):
         made = _clipped_again(view, ring, made.tolist(), turned, budget)
     if made is None and is_exact:
         made = _ears_of([*zip(*map(view.exact, ring))], 0, budget)
-        made = None if made is None or _turned_in(view, corners[made], budget) else made
+        made = None if made is None or _turned_in(view, corners, made, budget) else made
     if made is None:
         raise _failed(view, area, is_exact)
     return corners[made]
@@ -341,19 +335,18 @@ def _failed(view: Seen, area: Area, is_exact: bool) -> Exception:
     return TooComplexError(f"the section around {at} is not a polygon whose rings only touch; move the plane a little")
 
 
-def _turned_in(view: Seen, triangles: IntArray, budget: Budget) -> list[int]:
-    """Return which triangles are clockwise, exactly."""
-    used, local = np.unique(triangles, return_inverse=True)
-    high, low = view.points.at(used)
+def _turned_in(view: Seen, corners: IntArray, triangles: IntArray, budget: Budget) -> list[int]:
+    """Return which triangles of corners are clockwise, exactly."""
+    high, low = view.points.at(corners)
     is_open = np.empty(len(triangles), np.bool_)
     axes = read_only(np.array(view.axes))
     with np.errstate(all="ignore"):
         size = 2.0 * view.points.size  # of the ends of edges that were cut
-        entry_of(find_turned)(high, low, size, local.reshape(-1, 3), axes, is_open)
+        entry_of(find_turned)(high, low, size, triangles, axes, is_open)
     turned = []
     for row in np.flatnonzero(is_open).tolist():
         budget.check()
-        if view.turn(*triangles[row].tolist()) < 0:
+        if view.turn(*corners[triangles[row]].tolist()) < 0:
             turned.append(row)
     return turned
 

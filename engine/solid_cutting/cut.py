@@ -250,7 +250,7 @@ def cut_by_planes(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Lef
             continue
         left = cut_triangles(points, triangles, plane, budget, sides)
         cap = cap_of(seen(points, plane), left.chain, budget)
-        triangles = np.concatenate([triangles[left.whole], left.pieces, cap])
+        triangles = np.concatenate([np.take(triangles, left.whole, axis=0), left.pieces, cap])
         origins = np.concatenate([origins[left.whole], origins[left.of], np.full(len(cap), -1 - number)])
         n_new = len(left.pieces) + len(cap)
         is_whole = np.concatenate([is_whole[left.whole], np.zeros(n_new, np.bool_)])

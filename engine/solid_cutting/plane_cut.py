@@ -13,7 +13,6 @@ Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974, for e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -50,7 +49,7 @@ def plane_of(row: Sequence[Number]) -> Plane:
     shift = max(x.bit_length() for x in integers)
     scaled = [x / (1 << shift) for x in integers]  # rounded once; no less than 2^-1000 where it counts
     is_exact = all(
-        Fraction(x) * (1 << shift) == n and (x == 0.0 or x > 2.0**-_MOST_EXPONENT or -x > 2.0**-_MOST_EXPONENT)
+        n == 0 or (n.bit_length() - (n & -n).bit_length() < 53 and abs(x) > 2.0**-_MOST_EXPONENT)
         for x, n in zip(scaled, integers)
     )
     return Plane(integers, read_only(np.array(scaled)), is_exact)

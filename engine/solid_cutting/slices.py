@@ -12,6 +12,7 @@ Source: S. McMains, C. Sequin, A coherent sweep plane slicer for layered manufac
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -20,11 +21,11 @@ from engine.compiling.jit import entry_of, kernel
 from engine.predicates.side import side_of_plane
 from engine.predicates.vectors import as_point3
 from engine.running.budget import Budget
-from engine.solid_cutting.caps import Area, Ring, Seen, areas_of, rings_of, seen
+from engine.solid_cutting.caps import Area, Ring, Seen, areas_of, oriented, rings_of, seen
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles
 from engine.solid_cutting.shells import outward, shells
 from engine.solids.mesh import Polyhedron
-from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, Int8Array, IntArray, read_only
+from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, IntArray, read_only
 
 _POLL = 0xFFF
 
@@ -137,31 +138,6 @@ def chain_faces(
     return n_rings
 
 
-@kernel
-def turn_rings(points: FloatArray, i: int, j: int, ends: IntArray, firsts: IntArray, signs: Int8Array) -> None:
-    """Fill firsts with the leftmost point of each ring, seen on axes i and j, the lowest of these; and signs with that
-    of its area, 0 where rounding may have changed it. points: those of all rings, up to `ends`.
-
-    Differences are off by u of the largest coordinates, products and sums of n by n 2^-50 of the span squared.
-    """
-    start = 0
-    for ring in range(ends.shape[0]):
-        stop, size, span, area = ends[ring], 0.0, 0.0, 0.0
-        first = stop - 1
-        x0, y0 = points[start, i], points[start, j]
-        for k in range(start, stop):
-            after = k + 1 if k + 1 < stop else start
-            x, y = points[k, i], points[k, j]
-            if x < points[first, i] or (x == points[first, i] and y < points[first, j]):
-                first = k
-            size = max(size, abs(x), abs(y))
-            span = max(span, abs(x - x0), abs(y - y0))
-            area += (x - x0) * (points[after, j] - y0) - (points[after, i] - x0) * (y - y0)
-        bound = (stop - start) * 2.0**-49 * (span * size + span * span) + 2.0**-1000
-        firsts[ring], signs[ring] = first, 1 if area > bound else -1 if -area > bound else 0
-        start = stop
-
-
 Slice = tuple[Seen, Plane, list[Area]]
 _BYTES: Final = 100
 """Of a face that crosses a plane."""
@@ -215,16 +191,11 @@ def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolAr
         numbers = cuts[:, 0].copy()
         numbers[crosses] = np.arange(len(points), len(points) + int(crosses.sum()))
         points.add(np.ascontiguousarray(cuts[crosses, :2]), planes, cuts[crosses, 2], budget)
-        leftmost, signs = np.empty(n_rings, np.int64), np.empty(n_rings, np.int8)
-        axes = seen(points, planes[0]).axes
-        with np.errstate(all="ignore"):
-            entry_of(turn_rings)(points.rounded(numbers), *axes, ends, leftmost, signs)
-        is_open[of[signs == 0]] = True
-        start = 0
-        for number, stop, first, sign in zip(of.tolist(), ends.tolist(), leftmost.tolist(), signs.tolist()):
-            ring = np.concatenate([numbers[first:stop], numbers[start:first]]).tolist()
+        listed = numbers.tolist()
+        rings = [listed[start:stop] for start, stop in pairwise([0, *ends.tolist()])]
+        for number, ring, sign in zip(of.tolist(), *oriented(seen(points, planes[0]), rings)):
+            is_open[number] |= sign == 0
             (shells_of if sign > 0 else holes_of)[number].append(ring)
-            start = stop
     made: list[Slice] = []
     for number, plane in enumerate(planes):
         budget.check()
