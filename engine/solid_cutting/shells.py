@@ -248,6 +248,7 @@ def _matched(points: FloatArray, faces: IntArray, edges: Edges, way: int, budget
     if ((edges.uses == 2) | (edges.uses == 1)).all():
         return edges
     of, n = edges.of.copy(), len(edges.ends)
+    layers = _numbers_of(shells_of(_separated(edges), budget), len(faces))
     for corner in np.flatnonzero(edges.uses[of.ravel()] == 0).tolist():  # from a vertex to itself: joins nothing
         of[corner // 3, corner % 3], n = n, n + 1
     order = np.argsort(edges.of.ravel(), kind="stable")
@@ -255,15 +256,18 @@ def _matched(points: FloatArray, faces: IntArray, edges: Edges, way: int, budget
     for edge in np.flatnonzero(edges.uses > 2).tolist():
         budget.check()
         corners = order[starts[edge] : starts[edge + 1]]
-        for one, other in _matches(points, faces, edges.ends[edge], corners, way):
+        for one, other in _matches(points, faces, edges.ends[edge], corners, way, layers):
             of[one // 3, one % 3] = of[other // 3, other % 3] = n
             n += 1
     return Edges(np.zeros((n, 2), np.int64), of, edges.uses, edges.net)
 
 
-def _matches(points: FloatArray, faces: IntArray, ends: IntArray, corners: IntArray, way: int) -> list[tuple[int, int]]:
+def _matches(
+    points: FloatArray, faces: IntArray, ends: IntArray, corners: IntArray, way: int, layers: IntArray
+) -> list[tuple[int, int]]:
     """Return pairs of sides at an edge, side k of face i as 3 i + k: neighbours by angle, in opposite directions. way:
-    1 where faces at the same angle that look away from each other lie as if shells were smaller, -1 if larger."""
+    1 where faces at the same angle that look away from each other lie as if shells were smaller, -1 if larger. Those
+    that look the same way lie as if each were moved to where it looks, the farther the greater its number in layers."""
     apexes = faces[corners // 3, (corners + 2) % 3]
     numbers = scaled_integers(points[np.concatenate([ends, apexes])].ravel().tolist())
     a, b, *others = (tuple(numbers[k : k + 3]) for k in range(0, len(numbers), 3))
@@ -272,13 +276,13 @@ def _matches(points: FloatArray, faces: IntArray, ends: IntArray, corners: IntAr
     first = next((arm for arm in arms if any(cross(axis, arm))), arms[0])
     normal = cross(axis, first)
     keys = []
-    for corner, apex, arm in zip(corners.tolist(), apexes.tolist(), arms):
+    for corner, arm in zip(corners.tolist(), arms):
         across = cross(axis, arm)
         rise, run = sign_of(dot(normal, arm)), sign_of(dot(normal, across))
         half = -1 if not any(across) else 0 if rise > 0 or (rise == 0 and run > 0) else 1
-        is_odd = sorted((*ends.tolist(), apex)).index(apex) == 1  # the middle one of the three: angles run down
-        is_up = faces[corner // 3, corner % 3] == ends[0]
-        keys.append((half, arm, (-way if is_up else way, -(corner // 3) if is_odd else corner // 3), corner))
+        face, is_up = corner // 3, faces[corner // 3, corner % 3] == ends[0]
+        layer = (layers[face], face) if is_up else (-layers[face], -face)
+        keys.append((half, arm, (-way if is_up else way, *layer), corner))
 
     def compare(one: Any, other: Any) -> int:
         turn = sign_of(dot(axis, cross(one[1], other[1]))) if one[0] == other[0] else other[0] - one[0]

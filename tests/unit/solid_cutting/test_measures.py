@@ -72,6 +72,16 @@ def test_cubes_that_share_edges_corners_and_walls() -> None:
         assert engine.volume(turned) == count
 
 
+def test_shells_in_a_common_edge_do_not_depend_on_the_order_of_faces() -> None:
+    """Two boxes that look the same way share an edge, the second and the third one a wall."""
+    ends = [((0, 0, 0), (64, 64, 64)), ((0, 2, 0), (64, 64, 62)), ((0, 2, 0), (64, 63, 62))]
+    vertices, faces = joined([(block(low, high), CUBE[:, :: (1, 1, -1)[k]]) for k, (low, high) in enumerate(ends)])
+    sizes = [np.prod(np.subtract(high, low)) for low, high in ends]
+    for seed in range(20):
+        order = np.random.default_rng(seed).permutation(len(faces))
+        assert engine.volume(engine.Polyhedron(vertices, faces[order])) == sizes[0] - sizes[1] + sizes[2]
+
+
 def test_faces_that_cross_are_refused_by_name() -> None:
     parts = [(block(np.zeros(3), np.full(3, 2)), CUBE), (block(np.ones(3), np.full(3, 3)), CUBE)]
     body = engine.Polyhedron(*joined(parts))
