@@ -224,8 +224,8 @@ async function once() {
   for (const solid of [now.first, now.second]) if (solid) await store(solid);
   const { path, body, items } = question.ask(now), text = JSON.stringify(body);
   showRequest(path, text);
-  const { answer, timing, seconds } = await ask(path, text);
-  const next = question.beside?.(now, body), other = next && (await ask(next.path, JSON.stringify(next.body))).answer;
+  const next = question.beside?.(now, body), both = [ask(path, text), next && ask(next.path, JSON.stringify(next.body))];
+  const [{ answer, timing, seconds }, other] = (await Promise.all(both)).map((got, i) => (i ? got?.answer : got));
   const more = question.further?.(now, body, answer), also = more ? await asked(more) : null;
   $("problem").hidden = true;
   $("stage").classList.remove("old");
@@ -309,7 +309,7 @@ function showPicture(now, drawn) {
     views.plane.show(prepared2d(framed(drawn, now.frame), colors), { corners: rings.flatMap(({ at }) => at), edges, count, grid: now.snap ? 0.25 : 0 });
   } else if (views.space) {
     const { turns, middle } = QUESTIONS[now.question], canTurn = turns || now.question === "collide";
-    views.space.show(prepared3d(drawn, now.frame, colors), { count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null });
+    views.space.show(prepared3d(drawn, now.frame, colors), { back: colors.stage.map((v) => v / 255), count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null });
     if (now.question === "proof" && !past.past.length) views.space.spin();
   }
 }

@@ -31,14 +31,15 @@ precision highp float; uniform vec4 color; out vec4 shade;
 void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard; shade = vec4(color.rgb, 1.0) * color.a; }`];
 
 const GRIP = 10; // pixels within which a ring is taken
+const LATE = 40; // milliseconds from asking for a frame to drawing it: three such in turn, and the machine is slow
 const CIRCLE = Array.from({ length: 65 }, (_, i) => [Math.cos((Math.PI * i) / 32), Math.sin((Math.PI * i) / 32)]);
 const AXES = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 
 export class View3D {
   constructor(canvas, { onMove, onTurn, onTurnEnd }) {
     this.canvas = canvas;
-    this.gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true });
-    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, radius: 2.1, items: [], panes: 1, rings: null, buffers: new Map() });
+    this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false });
+    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, radius: 2.1, items: [], panes: 1, rings: null, buffers: new Map(), back: [0, 0, 0], late: 0 });
     if (!this.gl) throw new Error("this browser has no WebGL 2; the 2D pictures work without it");
     [this.mesh, this.lines, this.points] = [MESH, LINES, POINTS].map((source) => program(this.gl, ...source));
     const fingers = new Fingers(canvas);
@@ -59,7 +60,7 @@ export class View3D {
     canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.spins = false; this.zoomBy(Math.exp(-event.deltaY / 500)); }, { passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("keydown", (event) => this.key(event, onMove));
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    new ResizeObserver(() => this.paint(!this.isSlow)).observe(canvas);
   }
 
   key(event, onMove) {
@@ -138,21 +139,37 @@ export class View3D {
 
   // items: {kind: "triangles" | "lines" | "points", positions: Float32Array, color: [r, g, b, a], width?, onTop?, pose?, pane?};
   // rings: {middle, radius} of the body that can be turned by them
-  show(items, { count = 1, rings = null, radius = 2.1 }) {
+  show(items, { back, count = 1, rings = null, radius = 2.1 }) {
     const used = new Set(items.map(({ positions }) => positions));
     for (const [positions, buffer] of this.buffers) if (!used.has(positions)) { this.gl.deleteBuffer(buffer); this.buffers.delete(positions); }
     const circles = rings ? ringsAround(rings).map((ring, k) => ({
       kind: "lines", positions: new Float32Array(ring.slice(1).flatMap((p, i) => [...ring[i], ...p])), color: [0, 1, 2].map((j) => (j === k ? 0.85 : 0.3)).concat(0.9), width: 2,
     })) : [];
-    Object.assign(this, { items: [...items, ...circles], panes: count, rings, radius });
+    Object.assign(this, { items: [...items, ...circles], panes: count, rings, radius, back });
     this.draw();
   }
 
+  // Once a frame, however often it is asked for. A slow machine draws the edges smooth only when the picture rests.
   draw() {
-    const { gl, canvas } = this, ratio = window.devicePixelRatio || 1, [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
+    if (this.asked) return;
+    this.asked = performance.now();
+    requestAnimationFrame(() => {
+      this.late = performance.now() - this.asked > LATE ? this.late + 1 : 0;
+      this.asked = 0;
+      if (this.late >= 3) this.isSlow = true;
+      clearTimeout(this.rest);
+      if (this.isSlow) this.rest = setTimeout(() => this.paint(true), 150);
+      this.paint(!this.isSlow);
+    });
+  }
+
+  // isSmooth: with at least two pixels for one of the screen along each axis, which the browser averages.
+  paint(isSmooth) {
+    const screen = window.devicePixelRatio || 1, ratio = isSmooth ? Math.max(2, screen) : Math.max(1, screen / 2);
+    const { gl, canvas } = this, [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
     if (!canvas.clientWidth) return;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    gl.clearColor(0, 0, 0, 0);
+    gl.clearColor(...this.back, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.BLEND); gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     const order = (item) => (item.onTop ? 2 : item.kind === "triangles" && item.color[3] < 1 ? 1 : 0);

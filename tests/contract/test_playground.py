@@ -55,6 +55,8 @@ def test_every_imported_module_is_there() -> None:
     for path in FOLDER.glob("*.js"):
         for name in re.findall(r'from "\./([^"]+)"', path.read_text("utf-8")):
             assert (FOLDER / name).is_file(), f"{path.name} imports {name}"
+    loaded = re.findall(r'(?:href|src)="playground/([^"]+\.js)"', (FOLDER / "index.html").read_text("utf-8"))
+    assert sorted(loaded) == sorted(path.name for path in FOLDER.glob("*.js")), "all are fetched at once"
 
 
 @pytest.fixture(scope="module")
@@ -641,6 +643,7 @@ def test_it_turns_until_it_is_taken_in_hand_and_not_for_those_who_want_less_moti
             other.mouse.click(*middle_of(other, "#view3d"))
             other.wait_for_timeout(300)
             assert other.locator("#view3d").screenshot() == other.locator("#view3d").screenshot()
+            wait_until(other, lambda at=other: at.evaluate("view3d.width === 2 * view3d.clientWidth"))  # smooth at rest
         other.close()
     assert turned == {"no-preference": True, "reduce": False}
 
