@@ -11,7 +11,7 @@ vector product from a compressed expansion is within 8 u^2 of itself, which `dot
 
 Under a pose p and e are double-doubles, off by `blur` at most: each of the six products of a determinant, with factors
 below M, moves by 3 blur (M + blur)^2, all of them by less than `_BLUR` blur (M + blur)^2. A sign that this leaves open,
-and a triangle in the line's plane or without area, are DEGENERATE: exact_hits.py decides. Signs that are proven leave t
+and a triangle without area, are DEGENERATE: exact_hits.py decides. Signs that are proven leave t
 open by as much as v and w are, relative to w: far ends and earlier hits are compared with that in mind.
 
 Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997. Changed: all is exact.
@@ -48,9 +48,12 @@ from engine.types import FlagArray, FloatArray, Point3
 Line = namedtuple("Line", "start way blur p q is_ray is_placed")
 """start, way: p and e as double-doubles; p, q: points whose line has the same direction, exactly, unless is_placed."""
 Hit = namedtuple("Hit", "code t low first second third")
-"""A contact: Kind.APART, DEGENERATE (open), or its code; its parameter t, the nearest double, and what is beyond it
-(within 2^-67 |t|); its barycentrics."""
-_NO_HIT, _OPEN_HIT = (Hit(int(kind), 0.0, 0.0, 0.0, 0.0, 0.0) for kind in (Kind.APART, Kind.DEGENERATE))
+"""A contact: Kind.APART, DEGENERATE (open), IN_PLANE (the line lies in the triangle's plane, see flat_hits.py), or its
+code; its parameter t, the nearest double, and what is beyond it (within 2^-67 |t|); its barycentrics."""
+IN_PLANE: Final = -3
+_NO_HIT, _OPEN_HIT, _FLAT_HIT = (
+    Hit(int(kind), 0.0, 0.0, 0.0, 0.0, 0.0) for kind in (Kind.APART, Kind.DEGENERATE, IN_PLANE)
+)
 _SURE: Final = 2.0**-70
 """Relative error below which quotients are hardly ever left open."""
 _BLUR: Final = 20.0
@@ -226,7 +229,7 @@ def triangle_hit(elements: FloatArray, element: int, is_safe: bool, line: Line, 
             return _NO_HIT
     way = least + greatest
     if way == 0:
-        return _NO_HIT if not line.is_placed and _is_beside(line, a, b, c) else _OPEN_HIT
+        return _OPEN_HIT if line.is_placed else _NO_HIT if _is_beside(line, a, b, c) else _FLAT_HIT
     if _sign(v) * way < 0:
         return _NO_HIT
     if _is_open(ab) or _is_open(bc) or _is_open(ca) or _is_open(v):

@@ -22,20 +22,21 @@ from engine.lanes.faces import CORNER_ROWS, longest_axis, near_triangles
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.predicates.error_free import U2, two_diff
-from engine.segment_clipping.hit_contacts import Line, triangle_hit
+from engine.segment_clipping.flat_hits import flat_stretch
+from engine.segment_clipping.hit_contacts import IN_PLANE, Hit, Line, triangle_hit
 from engine.segment_clipping.on_boundary.boundary_cut import Crossings, allocate_crossings, sort_crossings
-from engine.segment_clipping.on_boundary.contacts import Kind, Place, are_same_point, decode_place
+from engine.segment_clipping.on_boundary.contacts import Bit, Kind, Place, are_same_point, decode_place
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, far_end, local_segment, shear_of
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh
-from engine.segment_clipping.on_boundary.triangle_contacts import are_flush, corner
+from engine.segment_clipping.on_boundary.triangle_contacts import are_flush, corner, triangle_at
 from engine.types import OPEN, FlagArray, FloatArray, IntArray, Point3
 
 ALL, FIRST, ANY, NEAR = 0, 1, 2, 3
 """What is searched: all hits, the first, whether there is one; NEAR: the triangles that may be met."""
 ACROSS, TOUCH, RIM, END, ALONG = 0, 1, 2, 3, 4
-SETTLED, MET, NO_ROOM, UNSURE = 0, 1, -1, -2
-Rows = namedtuple("Rows", "source t triangle kind barycentric")
+SETTLED, MET, NO_ROOM, UNSURE, GOES_ON = 0, 1, -1, -2, -3
+Rows = namedtuple("Rows", "source t t_end triangle kind barycentric")
 """Hits as columns. Of NEAR only source and triangle."""
 _Scratch = namedtuple("_Scratch", "stack keys entered cuts")
 _SIDES: Final = (5, 3, 6, 1, 2, 4)
@@ -87,7 +88,8 @@ def _push(mesh: Mesh, node: int, bits: int, scratch: _Scratch, depth: int) -> in
 @inline
 def _search(mesh: Mesh, line: Line, keep: int, scratch: _Scratch, stop: FlagArray) -> int:
     """Fill the cuts of `scratch` with the contacts of a line, or those of its first hit; return their number, NO_ROOM,
-    or UNSURE. ANY: 1 if there is one. NEAR: cuts.met is filled with all triangles near."""
+    or UNSURE. ANY: 1 if there is one. NEAR: cuts.met is filled with all triangles near. FIRST: GOES_ON if the line may
+    run along a triangle there, so that the hit has other contacts farther on."""
     x, y, z = mesh.inverse[0], mesh.inverse[1], mesh.inverse[2]
     start = Point3(  # order: the tails are added to what the origin leaves, of which they may be no small part
         line.start[0][0] * x - mesh.origin[0] * x + line.start[0][1] * x,
@@ -119,13 +121,16 @@ def _search(mesh: Mesh, line: Line, keep: int, scratch: _Scratch, stop: FlagArra
             bits &= bits - 1
             if below == EMPTY:
                 continue
-            if n == cuts.met.size:
+            if n + 2 > cuts.met.size:
                 return NO_ROOM
             cuts.met[n] = -1 - below
             if keep == NEAR:
                 n += 1
                 continue
             hit = triangle_hit(mesh.elements, -1 - below, mesh.are_safe, line, best, keep == ANY)
+            end = n
+            if hit.code == IN_PLANE:
+                hit, end = _flat_hit(mesh, -1 - below, line, cuts, n)
             if hit.code == Kind.APART:
                 continue
             if keep == ANY and hit.code != Kind.DEGENERATE:
@@ -138,13 +143,26 @@ def _search(mesh: Mesh, line: Line, keep: int, scratch: _Scratch, stop: FlagArra
             if keep == FIRST:
                 if hit.t > best:
                     continue
+                if hit.code & Bit.BEGINS != 0:
+                    return GOES_ON
                 if hit.t < best:
-                    best, last, n = hit.t, _bound_of(start, way, local, hit.t), 0
+                    best, last, n, end = hit.t, _bound_of(start, way, local, hit.t), 0, 0
             cuts.t[n], cuts.met[n], cuts.codes[n] = hit.t, -1 - below, hit.code
             cuts.points[n, 0], cuts.points[n, 1], cuts.points[n, 2] = hit.first, hit.second, hit.third
             cuts.points[n, 3] = hit.low
-            n += 1
+            n = end + 1
     return UNSURE if is_open else n
+
+
+@inline
+def _flat_hit(mesh: Mesh, element: int, line: Line, cuts: Crossings, n: int) -> tuple[Hit, int]:
+    """Return the contact where a line enters a triangle of its plane, and n + 1 if it leaves it elsewhere, n if not;
+    the contact there is put in place n + 1."""
+    each = flat_stretch(line, *triangle_at(mesh.elements, element))
+    if each.end_code != 0:
+        cuts.t[n + 1], cuts.met[n + 1], cuts.codes[n + 1] = each.t_end, element, each.end_code
+        cuts.points[n + 1, 3] = each.low_end
+    return Hit(each.code, each.t, each.low, each.first, each.second, each.third), n + (each.end_code != 0)
 
 
 @inline
@@ -186,37 +204,58 @@ def _write_hits(
     mesh: Mesh, rims: FlagArray, cuts: Crossings, n: int, keep: int, source: int, out: Rows, row: int
 ) -> int:
     """Write the hits that n contacts make to `out` from `row` on, with FIRST the first; return the next row, or UNSURE
-    if contacts that are not proven apart may be different points. The line lies in the plane of no triangle that it has
-    a contact with, so it meets triangles of one plane in one point."""
+    if contacts that are not proven apart may be different points. Triangles of one plane in which the line does not lie
+    are met in one point."""
     cuts.order[0] = 0
     if n > 1:
         _sort(cuts, n)
     place, n_rows = 0, n if keep == ALL else 1
     while place < n and n_rows > 0:  # bound: each turn passes a contact
         first, n_rows = cuts.order[place], n_rows - 1
-        best, turns, is_rim, at = first, 0, False, decode_place(cuts.codes[first])
-        while place < n and not _are_apart(cuts, cuts.order[place], first):
+        here, best, turns, is_rim, n_along = first, first, 0, False, 0
+        while place < n and (n_along > 0 or not _are_apart(cuts, cuts.order[place], here)):
             i = cuts.order[place]
-            element, code = cuts.met[i], cuts.codes[i]
-            if i != first and not (
-                are_same_point(mesh.elements, cuts.met[first], cuts.codes[first], element, code)
-                or are_flush(mesh.elements, cuts.met[first], element)
+            if _are_apart(cuts, i, here):
+                here = i
+            element, code, other = cuts.met[i], cuts.codes[i], cuts.codes[here]
+            if i != here and not (
+                are_same_point(mesh.elements, cuts.met[here], other, element, code)
+                or ((code | other) & Bit.ALONG == 0 and are_flush(mesh.elements, cuts.met[here], element))
             ):
                 return UNSURE
             turns ^= code & 1
-            if decode_place(code) < Place.START:
-                is_rim |= rims[element] & _SIDES[decode_place(code)] != 0
-            face, least = mesh.faces[element], mesh.faces[cuts.met[best]]
-            if face < least or (face == least and element < cuts.met[best]):
-                best = i
+            n_along += (code & Bit.BEGINS != 0) - (code & Bit.CEASES != 0)
+            if here == first:
+                at = decode_place(code)
+                is_rim |= at < Place.START and rims[element] & _SIDES[at] != 0
+                if _comes_before(mesh, cuts, i, best):
+                    best = i
             place += 1
-        is_end = Place.START <= at <= Place.END
-        out.source[row], out.t[row], out.triangle[row] = source, cuts.t[first], cuts.met[best]
+        is_end = Place.START <= decode_place(cuts.codes[first]) <= Place.END
+        out.source[row], out.t[row], out.t_end[row], out.triangle[row] = (
+            source,
+            cuts.t[first],
+            cuts.t[here],
+            cuts.met[best],
+        )
         out.kind[row] = END if is_end else RIM if is_rim else ACROSS if turns == 1 else TOUCH
+        if here != first:
+            out.kind[row] = ALONG
         for k in range(3):
             out.barycentric[row, k] = cuts.points[best, k]
         row += 1
     return row
+
+
+@inline
+def _comes_before(mesh: Mesh, cuts: Crossings, i: int, j: int) -> bool:
+    """Return whether the triangle of contact i counts before that of contact j at the same point: those in whose plane
+    the line lies are the last, then the least face counts."""
+    is_along, is_other = cuts.codes[i] & Bit.ALONG, cuts.codes[j] & Bit.ALONG
+    if is_along != is_other:
+        return is_along < is_other
+    face, other = mesh.faces[cuts.met[i]], mesh.faces[cuts.met[j]]
+    return face < other or (face == other and cuts.met[i] < cuts.met[j])
 
 
 @called
@@ -234,6 +273,8 @@ def _run(
             continue
         line = _line_of(lines, tails, blurs, item, is_ray)
         n_met = _search(mesh, line, keep, scratch, stop)
+        if n_met == GOES_ON:
+            n_met = _search(mesh, line, ALL, scratch, stop)
         if n_met == NO_ROOM or (keep != ANY and row + n_met > out.source.size):
             n[2] = 1
             return

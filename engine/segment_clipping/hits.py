@@ -167,8 +167,9 @@ def hits(
 
     Accuracy: decisions exact for every finite input; numbers are nearest doubles, each on its own, zero as +0.0.
 
-    Cost: a tree, unit normals and rims are prepared once, then O(log faces + hits) a line. Lines in the plane of a face
-    that they may meet, and numbers beyond 2^120, take exact arithmetic, some 0.2 ms.
+    Cost: a tree, unit normals and rims are prepared once, then O(log faces + hits) a line. Lines that run
+    along a face take some 2 us, faces without area, numbers beyond 2^120 and, under poses, lines in the plane of a face
+    that they may meet exact arithmetic, some 0.2 ms.
 
     References
     ----------
@@ -246,7 +247,12 @@ def search(
         while reached[0] < last - first:  # bound: each turn takes a line, or has twice the room
             before, m = reached[0], room + (last - first if keep != ANY else 0)
             out = Rows(
-                np.empty(m, np.int64), np.empty(m), np.empty(m, np.int64), np.empty(m, np.int8), np.empty((m, 3))
+                np.empty(m, np.int64),
+                np.empty(m),
+                np.empty(m),
+                np.empty(m, np.int64),
+                np.empty(m, np.int8),
+                np.empty((m, 3)),
             )
             entry_of(find_hits)(
                 *(arrays if last - first == n else [array[first:last] for array in arrays]), is_ray, target.mesh,
@@ -255,7 +261,7 @@ def search(
             budget.check()
             rows = int(reached[1])
             budget.take(_BYTES * rows)
-            part = Rows(out.source[:rows], out.t[:rows], out.triangle[:rows], out.kind[:rows], out.barycentric[:rows])
+            part = Rows(*(column[:rows] for column in out))
             if first:
                 part.source[:] += first
             parts[first].append(part)
@@ -267,8 +273,8 @@ def search(
         run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=_FEW)
     every = [part for first in sorted(parts) for part in parts[first]]
     if not every:
-        none = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int8), np.zeros((0, 3))
-        return Rows(*none), state
+        none, whole = np.zeros(0), np.zeros(0, np.int64)
+        return Rows(whole, none, none, whole, np.zeros(0, np.int8), np.zeros((0, 3))), state
     return Rows(*join_columns(every, budget, workers)), state
 
 
@@ -285,9 +291,9 @@ def find(
         answer[left] = [bool(exact[item]) for item in left.tolist()]
         return answer, left
     if not len(left):
-        return [*columns[:2], columns.t, *columns[2:]], left
+        return [*columns], left
     more = columns_of([(item, each) for item, hits in exact.items() for each in hits[: 1 if keep == FIRST else None]])
-    joint = [np.concatenate(pair) for pair in zip((*columns[:2], columns.t, *columns[2:]), more)]
+    joint = [np.concatenate(pair) for pair in zip(columns, more)]
     order = np.argsort(joint[0], kind="stable")
     return [column[order] for column in joint], left
 

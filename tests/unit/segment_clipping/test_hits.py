@@ -150,6 +150,17 @@ def test_equal_to_rationals(name: str, is_ray: bool) -> None:
         assert any_of[k] == bool(rows)
 
 
+def test_lines_in_the_planes_of_faces_take_no_integers() -> None:
+    draw = np.random.default_rng(19)
+    for name, axis, level in (("plane", 2, 0.0), ("cube", 0, 4.0), ("cube", 1, 0.0)):
+        surface = engine.Surface(*MESHES[name])
+        lines = draw.uniform(-1, 5, (300, 2, 3))
+        lines[::3, 1] = np.round(lines[::3, 1])
+        lines[:, :, axis] = level
+        _, accuracy = engine.hits(lines, surface, report=True)
+        assert accuracy.n_rational == 0
+
+
 def images_under(pose: engine.Pose, surface: Any) -> list[Any]:
     """Return the corners of the triangles of a surface under a pose, as fractions."""
     rotation = [vector(row) for row in pose.rotation.tolist()]
