@@ -370,7 +370,7 @@ def overlap_bodies(
     is_ratio: bool, placed: FloatArray, planes: FloatArray, sides: FloatArray, polygons: FloatArray,
     values: FloatArray, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill values (n,) with the common volumes of pairs (n, 2) of bodies, or their ratios to the union, NaN where that
+    """Fill values (n,) with the common volumes of pairs (n, 4) of bodies, or their ratios to the union, NaN where that
     is not certain; return the number of NaN.
 
     | array | contents |
@@ -379,7 +379,8 @@ def overlap_bodies(
     | corners, rings | faces, rings[k] .. rings[k + 1] of corners, counted from the body's first; seen from outside they
     run counter-clockwise |
     | bodies (.., 4) | first point, first face, number of points, of faces |
-    | poses (2, 13) | of all first and of all second bodies: rotation, translation, 0.0 for none |
+    | pairs (n, 4) | numbers of two bodies, and of their poses |
+    | poses (.., 13) | rotation, translation, 0.0 for none |
     | placed (2, .., 6), planes (2, .., 13), sides (2, .., ..), polygons (2, .., 8) | scratch |
     """
     n_open, origin, exact, their_exact, sums = 0, workspace(3), workspace(3), workspace(3), workspace(6)
@@ -387,18 +388,19 @@ def overlap_bodies(
         if flag[0] != 0:
             break
         first, second = bodies[pairs[item, 0]], bodies[pairs[item, 1]]
+        pose, their_pose = poses[pairs[item, 2]], poses[pairs[item, 3]]
         for axis in range(3):
             at = points[first[0], axis]
-            if poses[0, 12] != 0.0:
-                at = poses[0, 9 + axis]
+            if pose[12] != 0.0:
+                at = pose[9 + axis]
                 for k in range(3):
-                    at += poses[0, 3 * axis + k] * points[first[0], k]
+                    at += pose[3 * axis + k] * points[first[0], k]
             origin[axis] = at
         faces, theirs = rings[first[1] : first[1] + first[3] + 1], rings[second[1] : second[1] + second[3] + 1]
         own = Body(corners, faces, placed[0, : first[2]], exact, planes[0, : first[3]], sides[0])
         other = Body(corners, theirs, placed[1, : second[2]], their_exact, planes[1, : second[3]], sides[1])
-        eta = _place(points[first[0] : first[0] + first[2]], poses[0], origin, own)
-        eta = max(eta, _place(points[second[0] : second[0] + second[2]], poses[1], origin, other))
+        eta = _place(points[first[0] : first[0] + first[2]], pose, origin, own)
+        eta = max(eta, _place(points[second[0] : second[0] + second[2]], their_pose, origin, other))
         span = 0.0
         for body in (own.placed, other.placed):
             for k in range(body.shape[0]):

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from engine.collision.collide import posed, read_pair
+from engine.collision.collide import read_pair
 from engine.collision.exact_images import as_vector, image_plane, plane_in_frame
-from engine.errors import UnsupportedPairError, WrongDimensionError
+from engine.errors import InvalidArrayError, UnsupportedPairError, WrongDimensionError
 from engine.polygon_clipping.planes import plan_of
 from engine.predicates.rational import Number, determinant, nearest_float, scaled_integers
 from engine.running.budget import Budget, Cancel
@@ -24,16 +24,18 @@ from engine.solid_cutting.overlap_batches import (
     of_bodies,
     overlap_of_polygons,
     overlaps_of_arrays,
+    pose_of,
     ratio_of,
 )
 from engine.solid_cutting.plane_cut import Points, plane_of
 from engine.solid_cutting.shells import outward
-from engine.solids.accepted import PoseLike, SolidLike
+from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid, named
 from engine.solids.convexity import convexity
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
+from engine.solids.poses import Poses
 from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import Accuracy, FloatArray
 
@@ -44,8 +46,8 @@ def overlap_volume(
     first: SolidLike | Sequence[SolidLike],
     second: SolidLike | Sequence[SolidLike],
     *,
-    first_pose: PoseLike | None = None,
-    second_pose: PoseLike | None = None,
+    first_pose: PoseLike | PosesLike | None = None,
+    second_pose: PoseLike | PosesLike | None = None,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -61,15 +63,16 @@ def overlap_volume(
         triangle or aabb each, or convex or aabb each. Lists and arrays are pairs, item by item: (n, k, 2) polygons of k
         corners (rectangles, turned ones too), (n, 5) boxes by centre, width, height and angle in radians, whose corners
         are computed in float64 and then taken as they are.
-    first_pose, second_pose : Pose, optional
-        As for `collide`; of lists, of all items. Polygons and triangles take none.
+    first_pose, second_pose : Pose, Poses or list of Pose and None, optional
+        As for `collide`; of lists, of all items, or one for each. Two solids with many poses are as many pairs.
+        Polygons and triangles take none.
     workers, deadline, cancel, progress, report
         As for `locate`; progress counts pairs.
 
     Returns
     -------
     float
-        For lists and arrays an array (n,) of float64. With ``report=True`` a pair of it and an `Accuracy`.
+        For lists, arrays and many poses an array (n,) of float64. With ``report=True`` a pair of it and an `Accuracy`.
 
     Raises
     ------
@@ -108,8 +111,8 @@ def iou(
     first: SolidLike | Sequence[SolidLike],
     second: SolidLike | Sequence[SolidLike],
     *,
-    first_pose: PoseLike | None = None,
-    second_pose: PoseLike | None = None,
+    first_pose: PoseLike | PosesLike | None = None,
+    second_pose: PoseLike | PosesLike | None = None,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -128,7 +131,7 @@ def iou(
     Returns
     -------
     float
-        From 0.0 to 1.0; 0.0 where both have no volume. For lists and arrays an array (n,) of float64. With
+        From 0.0 to 1.0; 0.0 where both have no volume. For lists, arrays and many poses an array (n,) of float64. With
         ``report=True`` a pair of it and an `Accuracy`.
 
     Raises
@@ -162,16 +165,16 @@ def _of_pairs(first: Any, second: Any, poses: tuple[Any, Any], options: tuple[An
     are_many = all(isinstance(each, (list, np.ndarray)) and not _is_rings(each) for each in (first, second))
     with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
-        if are_many and all(isinstance(each, np.ndarray) for each in (first, second)) and poses[0] is poses[1] is None:
+        moves = [_listed(pose) for pose in poses]
+        if are_many and all(isinstance(each, np.ndarray) for each in (first, second)) and moves == [None, None]:
             values, n_exact = overlaps_of_arrays(first, second, is_ratio, workers, budget)
         else:
-            if are_many:
-                check_same_length(first, second)
-            pairs = list(zip(first, second, strict=True)) if are_many else [(first, second)]
-            values, n_exact = of_bodies(pairs, poses, is_ratio, workers, budget), 0
+            pairs = _pairs_of(first, second, moves, are_many, budget)
+            are_many = are_many or any(isinstance(move, list) for move in moves)
+            values, n_exact = of_bodies(pairs, moves, is_ratio, workers, budget), 0
             for number in np.flatnonzero(np.isnan(values)).tolist():
                 budget.check()
-                values[number], is_exact = _of_pair(*pairs[number], poses, is_ratio, budget)
+                values[number], is_exact = _of_pair(*pairs[number], moves, number, is_ratio, budget)
                 n_exact += is_exact
     n = len(values)
     if progress is not None:
@@ -185,8 +188,35 @@ def _is_rings(value: Any) -> bool:
     return isinstance(value, list) and len(value) > 0 and not isinstance(value[0], Solid)
 
 
-def _of_pair(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, budget: Budget) -> tuple[float, bool]:
-    """Return the common volume of two solids, or its ratio, and whether it took exact arithmetic."""
+def _listed(pose: Any) -> Any:
+    """Return many poses as a list, others as they are."""
+    if isinstance(pose, np.ndarray) and pose.ndim == 3:
+        pose = Poses(pose)
+    is_many = isinstance(pose, Poses) or (isinstance(pose, list) and not set(map(type, pose)) - {Pose, type(None)})
+    return list(pose) if is_many else pose
+
+
+def _pairs_of(
+    first: Any, second: Any, moves: Sequence[Any], are_many: bool, budget: Budget
+) -> Sequence[tuple[Any, Any]]:
+    """Return the pairs of an argument. moves: poses of all, or lists."""
+    if are_many:
+        check_same_length(first, second)
+    elif not (isinstance(first, Solid) and isinstance(second, Solid)):
+        first, second, _ = read_pair(first, second, budget.left(), budget.cancel)
+    counts = [len(move) for move in moves if isinstance(move, list)]
+    n = len(first) if are_many else counts[0] if counts else 1
+    for name, move in zip(("first_pose", "second_pose"), moves):
+        if isinstance(move, list) and len(move) != n:
+            raise InvalidArrayError(f"{name} has {len(move)} poses for {n} pairs; give one, or one for each", (name,))
+    return list(zip(first, second)) if are_many else [(first, second)] * n
+
+
+def _of_pair(
+    first: Any, second: Any, poses: Sequence[Any], number: int, is_ratio: bool, budget: Budget
+) -> tuple[float, bool]:
+    """Return the common volume of two solids, or its ratio, and whether it took exact arithmetic. poses: as for
+    `of_bodies`."""
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
         first, second, _ = read_pair(first, second, budget.left(), budget.cancel)
     if first.dimension != second.dimension:
@@ -195,7 +225,7 @@ def _of_pair(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, bu
             "both must have one dimension",
             ("second",),
         )
-    moves = posed(poses[0], first, "first_pose"), posed(poses[1], second, "second_pose")
+    moves = pose_of(poses[0], first, 0, number), pose_of(poses[1], second, 1, number)
     if first.dimension == 2 and any(isinstance(each, (Polygon, Triangle)) for each in (first, second)):
         return overlap_of_polygons(first, second, moves, is_ratio, budget), False
     if isinstance(first, Aabb) and isinstance(second, Aabb) and moves == (None, None):

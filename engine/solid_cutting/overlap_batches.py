@@ -39,6 +39,7 @@ from engine.solids.checks import as_floats
 from engine.solids.convexity import convexity
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
+from engine.solids.pose import Pose
 from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import FloatArray, IntArray, read_only
 
@@ -59,10 +60,10 @@ class Body(NamedTuple):
 
 
 def of_bodies(
-    pairs: Sequence[tuple[Any, Any]], poses: tuple[Any, Any], is_ratio: bool, workers: int | None, budget: Budget
+    pairs: Sequence[tuple[Any, Any]], poses: Sequence[Any], is_ratio: bool, workers: int | None, budget: Budget
 ) -> FloatArray:
     """Return the common volumes, or ratios, of those pairs of solids that are convex bodies of space, proven to be the
-    nearest doubles, NaN of others."""
+    nearest doubles, NaN of others. poses: of all first, and of all second ones, or lists of one a pair."""
     values = np.full(len(pairs), np.nan)
     unique = {id(solid): solid for pair in pairs for solid in pair}
     boxes = [solid for solid in unique.values() if isinstance(solid, Aabb) and solid.dimension == 3]
@@ -75,7 +76,8 @@ def of_bodies(
             if body is not None:
                 numbers[key] = len(boxes) + len(bodies)
                 bodies.append(body)
-    which = np.array([(numbers.get(id(one), -1), numbers.get(id(other), -1)) for one, other in pairs], np.int64)
+    named = [(numbers.get(id(one), -1), numbers.get(id(other), -1)) for one, other in pairs]
+    which = np.array(named, np.int64).reshape(-1, 2)
     rows: IntArray = np.flatnonzero((which >= 0).all(axis=1))
     if not len(rows):
         return values
@@ -95,25 +97,35 @@ def of_bodies(
     most, most_faces = sizes[:, 2:].max(axis=0).tolist()
     if most * most_faces > _LARGEST:
         return values
-    moves = np.array([_numbers_of(pose, pairs[int(rows[0])][k], k) for k, pose in enumerate(poses)])
+    places, moves = [which[rows]], list[list[float]]()
+    for k, pose in enumerate(poses):
+        chosen = rows if isinstance(pose, list) else rows[:1]
+        places.append(len(moves) + np.arange(len(rows))[:, None] * (len(chosen) > 1))
+        moves += [_numbers_of(pose, pairs[number][k], k, number) for number in chosen.tolist()]
     tables = [read_only(each) for each in (points, np.concatenate(corners), np.concatenate(ends), sizes)]
-    some = read_only(which[rows])
+    some, turns = read_only(np.concatenate(places, axis=1)), np.array(moves)
     made = np.full(len(rows), np.nan)
 
     def fill(start: int, stop: int) -> None:
         scratch = [np.empty((2, most, PLACED)), np.empty((2, most_faces, PLANE))]
         scratch += [np.empty((2, most_faces, most)), np.empty((2, most + most_faces + 8, CORNER))]
         out = made[start:stop]
-        entry_of(overlap_bodies)(*tables, some[start:stop], moves, is_ratio, *scratch, out, budget.flag)
+        entry_of(overlap_bodies)(*tables, some[start:stop], turns, is_ratio, *scratch, out, budget.flag)
 
     run_chunks(fill, len(rows), budget=budget, workers=workers, first_chunk=64)
     values[rows] = made
     return values
 
 
-def _numbers_of(pose: Any, solid: Solid, k: int) -> list[float]:
-    """Return the numbers of a pose, and 1.0, or zeros for none."""
-    move = posed(pose, solid, ("first_pose", "second_pose")[k])
+def pose_of(poses: Any, solid: Solid, k: int, number: int) -> Pose | None:
+    """Return the pose of a pair. poses: of the first solids of all, k = 0, or of the second, or a list."""
+    name = ("first_pose", "second_pose")[k]
+    return posed(poses[number], solid, name, number) if isinstance(poses, list) else posed(poses, solid, name)
+
+
+def _numbers_of(poses: Any, solid: Solid, k: int, number: int) -> list[float]:
+    """Return the numbers of a pair's pose, and 1.0, or zeros for none."""
+    move = pose_of(poses, solid, k, number)
     return [0.0] * 13 if move is None else [*move.rotation.ravel().tolist(), *move.translation.tolist(), 1.0]
 
 

@@ -101,10 +101,7 @@ def overlaps(question: OverlapRequest, call: Call) -> OverlapResponse:
     second = questions.to_solid(question.second, call, ("second",))
     models = question.poses
     poses = [None] if models is None else [questions.to_pose(pose, ("poses", k)) for k, pose in enumerate(models)]
-    made = []
-    accuracy = engine.Accuracy("exact", 0.5, 0, 0, 0, "overlap")
-    for pose in poses:
-        overlap, accuracy = call.compute(engine.overlap_volume, first, second, second_pose=pose)
-        ratio, _ = call.compute(engine.iou, first, second, second_pose=pose)
-        made.append(OverlapAnswer.made(overlap=overlap, iou=ratio))
+    volumes, accuracy = call.compute(engine.overlap_volume, first, second, second_pose=poses)
+    ratios, _ = call.compute(engine.iou, first, second, second_pose=poses)
+    made = [OverlapAnswer.made(overlap=each, iou=ratio) for each, ratio in zip(volumes.tolist(), ratios.tolist())]
     return OverlapResponse.made(overlaps=made, accuracy=from_accuracy(accuracy))

@@ -155,6 +155,30 @@ def test_convex_bodies_under_poses(seed: int) -> None:
     assert engine.iou(first[1], second[1], **limits) == ratios[1]
 
 
+@pytest.mark.parametrize("ask", [engine.overlap_volume, engine.iou])
+def test_each_pair_has_poses_of_its_own(ask: Any) -> None:
+    """Also where kernels leave a pair open: flat boxes, and a mesh that is not convex."""
+    draw = np.random.default_rng(5)
+    first, second = ([*(bodies(draw) for _ in range(6)), box] for box in (engine.Polyhedron(*star(2)), bodies(draw)))
+    first[3] = engine.Aabb([-1, -1, 0], [1, 1, 0])
+    turns, moves = ([poses(draw) for _ in range(7)] for _ in range(2))
+    turns[2] = moves[4] = None
+    alone = [
+        ask(one, other, first_pose=turn, second_pose=move)
+        for one, other, turn, move in zip(first, second, turns, moves)
+    ]
+    assert ask(first, second, first_pose=turns, second_pose=moves).tolist() == alone
+    shared = [ask(first[0], second[0], first_pose=turns[0], second_pose=move) for move in moves]
+    assert ask(first[0], second[0], first_pose=turns[0], second_pose=moves).tolist() == shared
+    many = engine.Poses([move for move in moves if move is not None])
+    assert ask(first[0], second[0], second_pose=many).tolist() == [
+        ask(first[0], second[0], second_pose=move) for move in many
+    ]
+    assert ask([], [], first_pose=[]).tolist() == ask(first[0], second[0], second_pose=[]).tolist() == []
+    with pytest.raises(engine.InvalidArrayError, match="second_pose has 6 poses for 7 pairs"):
+        ask(first, second, second_pose=moves[:6])
+
+
 def test_a_small_overlap_and_bodies_apart_by_edges_alone() -> None:
     """Corner in corner by 2^-20; and two rods that no face parts, but a plane through an edge of each."""
     unit, tiny = engine.Aabb([0, 0, 0], [1, 1, 1]), 2.0**-20
