@@ -182,9 +182,15 @@ def _is_beside(points: FloatArray, faces: IntArray, face: int, other: int) -> bo
 
 
 @kernel
-def find_candidates(points: FloatArray, faces: IntArray, pairs: IntArray, may_meet: BoolArray) -> None:
-    """Fill may_meet (n,) with whether pairs (n, 2) of faces may meet besides their common corners."""
+def find_candidates(points: FloatArray, faces: IntArray, pairs: IntArray, n_common: Int8Array) -> None:
+    """Fill n_common (n,) with how many corners pairs (n, 2) of faces have in common that may meet elsewhere too, -1 for
+    the others."""
     for item in range(pairs.shape[0]):
-        first, second = pairs[item, 0], pairs[item, 1]
-        is_apart = _is_beside(points, faces, first, second) or _is_beside(points, faces, second, first)
-        may_meet[item] = not is_apart
+        first, second, count = pairs[item, 0], pairs[item, 1], 0
+        if _is_beside(points, faces, first, second) or _is_beside(points, faces, second, first):
+            n_common[item] = -1
+            continue
+        for k in range(3):
+            for j in range(3):
+                count += faces[first, k] == faces[second, j]
+        n_common[item] = count

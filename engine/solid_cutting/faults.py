@@ -116,26 +116,23 @@ def crossings(
 ) -> IntArray:
     """Return the pairs of faces, of those that have area, with a common point besides their common corners and
     edges."""
-    corners = points[faces[solid_faces]]
+    a, b, c = (points[faces[solid_faces, k]] for k in range(3))
     at_junctions = _pairs_at(faces, at_edges)
     blocks = [np.zeros((0, 2), np.int64)]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    low, high = (pick(pick(a, b), c) for pick in (np.minimum, np.maximum))
     for block in pairs_of_boxes(low, high, budget.flag, 1 << 16) if len(solid_faces) else ():
         budget.check()
         pairs = solid_faces[block]
-        may_meet = np.empty(len(pairs), np.bool_)
-        entry_of(find_candidates)(read_only(points), read_only(faces), read_only(pairs), may_meet)
-        pairs = pairs[may_meet]
-        first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
-        same = first[:, :, None] == second[:, None, :]
-        n_common = same.sum(axis=(1, 2))
+        n_common = np.empty(len(pairs), np.int8)
+        entry_of(find_candidates)(read_only(points), read_only(faces), read_only(pairs), n_common)
+        pairs, n_common = pairs[n_common >= 0], n_common[n_common >= 0]
         meets = np.zeros(len(pairs), np.bool_)
         for n, test in enumerate((_apart_meet, _at_corner_meet, _at_edge_meet)):
             some = np.flatnonzero(n_common == n)
             if len(some):
-                order = [
-                    _common_first(each[some], same[some].any(axis=axis)) for each, axis in ((first, 2), (second, 1))
-                ]
+                first, second = faces[pairs[some, 0]], faces[pairs[some, 1]]
+                same = first[:, :, None] == second[:, None, :]
+                order = [_common_first(each, same.any(axis=axis)) for each, axis in ((first, 2), (second, 1))]
                 meets[some] = test(points[order[0]], points[order[1]], budget)
         hits = pairs[meets]
         blocks.append(hits[[tuple(pair) not in at_junctions for pair in hits.tolist()]] if len(at_junctions) else hits)
