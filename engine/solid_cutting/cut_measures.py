@@ -1,7 +1,7 @@
 """Volumes and areas of what planes leave, each the double nearest to the exact value for the input.
 
 Faces of given vertices are summed by the kernels. Corners that are cut points are rational, with denominators of their
-own, so a sum of them as one fraction would grow with their number: they are cut off to a number of bits, in integers,
+own, so a sum of them as one fraction would grow with their number: they are rounded to a number of bits, in integers,
 each off by less than one unit. With M the largest coordinate and L the largest difference of two, in units:
 
     m (a.z + b.z + c.z)     m off by 16 (M + 1), the sum by 6:            120 (M + 1)^2 a face
@@ -33,14 +33,23 @@ from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_vol
 from engine.types import IntArray, read_only
 
 _NO_SIDES: Final = read_only(np.zeros(0, np.int8))
-MOST_BITS: Final = 1 << 12
+_BITS: Final = (80, 128, 512, 2048)
+"""Bits of a coordinate that are tried: to the first, points are known without their fractions (`plane_cut.py`)."""
 Whole = tuple[int, int, int]
 
 
 def _cut_off(points: Points, numbers: Iterable[int], bits: int) -> tuple[dict[int, Whole], int, int]:
-    """Return the coordinates of points in units of 2^-k, cut off, k, and the largest of them."""
-    k = bits - int(np.frexp(points.size)[1])
-    places = {}
+    """Return the coordinates of points in units of 2^-k, rounded, k, and the largest of them."""
+    k, numbers = bits - int(np.frexp(points.size)[1]), list(numbers)
+    places: dict[int, Whole] = {}
+    if bits == _BITS[0] and points.is_in_range:  # points are known to 1 / 8 of a unit
+        high, low = (np.ldexp(some, k) for some in points.at(np.array(numbers, np.int64)))
+        whole = np.rint(high)
+        rest = np.rint((high - whole) + low)
+        for number, large, small in zip(numbers, whole.tolist(), rest.tolist()):
+            x, y, z = (int(a) + int(b) for a, b in zip(large, small))
+            places[number] = x, y, z
+        numbers = []
     for number in numbers:
         x, y, z, w = points.exact(number)
         w, up = (w, k) if k >= 0 else (w << -k, 0)
@@ -53,16 +62,14 @@ Ends = Callable[[int], tuple[Fraction, Fraction]]
 
 
 def narrowed(ends_of: Callable[[int], Any], rounded: Callable[[Any], float] = nearest_float) -> float | None:
-    """Return what both ends of a value round to, with as many bits as it takes; None beyond `MOST_BITS`."""
-    bits = 128
-    while bits <= MOST_BITS:
+    """Return what both ends of a value round to, with as many bits as it takes; None beyond the last of `_BITS`."""
+    for bits in _BITS:
         try:
             low, high = map(rounded, ends_of(bits))
             if low == high:
                 return low
         except NotRepresentableError:  # an end may be beyond the doubles where the value is not
             pass
-        bits *= 4
     return None
 
 
