@@ -74,8 +74,8 @@ def volume(
 
     Accuracy: sums in double-doubles with a proven bound, in integers where that does not decide.
 
-    Cost: some 0.02 us a face. The first call for a polyhedron that is not convex also looks for faces that cross and
-    for shells, 3 us a face, which is cached with the solid.
+    Cost: some 0.02 us a face. The first call for a polyhedron that is not star-shaped also looks for faces that cross
+    and for shells, 4 us a face, which is cached with the solid.
 
     References
     ----------

@@ -30,7 +30,7 @@ from engine.errors import EngineError, InvalidInputError
 from engine.predicates.rational import cross, dot, minus, scaled_integers, sign_of
 from engine.running.budget import Budget
 from engine.solid_cutting.faults import Edges, are_flat, crossings, edges_of, shells_of, sign_of_volume
-from engine.solids.convexity import convexity
+from engine.solids.convexity import convexity, star_side
 from engine.solids.mesh import Polyhedron
 from engine.types import FloatArray, Int8Array, IntArray, Rcc8, read_only
 
@@ -77,6 +77,8 @@ def _shells_of(solid: Polyhedron, budget: Budget) -> Shells:
     certificate = convexity(solid)
     if certificate is not None:
         return Shells(none, 1 if certificate.is_outward else -1, 1, False)
+    if side := star_side(solid):
+        return Shells(none, -side, 1, False)
     points, faces = solid.vertices, solid.triangles
     budget.check()
     edges = edges_of(faces)

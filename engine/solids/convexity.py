@@ -63,6 +63,16 @@ def _certified(solid: Polyhedron) -> Convexity | None:
     return Convexity(center, side < 0) if is_convex else None
 
 
+def star_side(solid: Polyhedron) -> int:
+    """Return -1 if the mesh of a polyhedron is the graph of a distance over a sphere about its centre, see the head of
+    this file, with its faces counter-clockwise seen from outside, 1 with clockwise ones; 0 if that is not certain."""
+    vertices, triangles = read_only(solid.vertices), read_only(solid.triangles)
+    with np.errstate(all="ignore"):
+        center = vertices[triangles.ravel()].mean(axis=0)
+        side = _common_side(vertices, triangles, center) if np.isfinite(center).all() else 0
+        return side if side != 0 and _is_graph(vertices, triangles, center, side) else 0
+
+
 @kernel
 def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
     """Return 1 or -1 if orient3d(a, b, c, center) has that sign for all triangles, else 0."""
@@ -87,6 +97,12 @@ def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, cent
         sign = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > corner else 0
         if sign != 0 and sign != side:
             return False
+    return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
+
+
+@kernel
+def _is_graph(vertices: FloatArray, triangles: IntArray, center: FloatArray, side: int) -> bool:
+    """Return whether some half-line from the centre crosses one triangle. side: result of `_common_side`."""
     return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
 
 

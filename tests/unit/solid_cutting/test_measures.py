@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 import engine
+from engine.running.budget import Budget
+from engine.solid_cutting.shells import shells
+from engine.solids.convexity import star_side
 from tests.reference.cutting import moment, nearest, points_of, signed_volume
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
 
@@ -70,6 +73,21 @@ def test_cubes_that_share_edges_corners_and_walls() -> None:
         assert engine.volume(engine.Polyhedron(*joined(parts))) == count
         turned = engine.Polyhedron(*joined([(corners, faces[:, ::-1]) for corners, faces in parts]))
         assert engine.volume(turned) == count
+
+
+def test_stars_are_told_without_looking_for_crossings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two nested ones, and a star from whose middle a face is seen from behind, are looked at as any other."""
+    vertices, faces = star(3)
+    bodies = [engine.Polyhedron(vertices + 5.0, faces), engine.Polyhedron(vertices, faces[:, ::-1])]
+    nested = engine.Polyhedron(*joined([(vertices, faces), (vertices / 4, faces)]))
+    bent = engine.Polyhedron(np.where(np.arange(len(vertices))[:, None] == 8, -0.5 * vertices, vertices), faces)
+    assert [star_side(each) for each in (*bodies, nested, bent)] == [-1, 1, 0, 0]
+    assert engine.volume(nested) == nearest(signed_volume(points_of(vertices), faces) * Fraction(63, 64))
+    found = [shells(body, Budget(None)) for body in bodies]
+    monkeypatch.setattr("engine.solid_cutting.shells.star_side", lambda body: 0)
+    for body, (*_, common, n, touches) in zip(bodies, found):
+        copy = engine.Polyhedron(body.vertices, body.triangles)
+        assert shells(copy, Budget(None))[1:] == (common, n, touches)
 
 
 def test_shells_in_a_common_edge_do_not_depend_on_the_order_of_faces() -> None:
