@@ -38,6 +38,7 @@ from engine.collision.meshes.placement import PoseArrays, as_placement, defect_o
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.distance.closed_forms import Wide, Wide3, less, less3
+from engine.distance.exact_within import compare_with_limit
 from engine.distance.point_mesh import PointMesh, mesh_at, pose_at
 from engine.distance.point_triangle import UNSURE, distance_to, feature_under, measure, seen_from
 from engine.distance.refined import (
@@ -225,9 +226,9 @@ def _rounded(distance: Wide, error: float, unit: float) -> float:
 
 
 @called
-def _refine(view: View, q: Point3, n: int, candidates: Candidates) -> tuple[float, int]:
-    """Return the distance of a point from the first n candidates, which is not 0, as the nearest double, -1.0 if
-    unproven; and n less those that are farther."""
+def _refine(view: View, q: Point3, n: int, candidates: Candidates) -> tuple[Wide, float, int]:
+    """Return the distance of a point from the first n candidates, which is not 0, a bound on its error, and n less
+    those that are farther."""
     none = Wide(0.0, 0.0)
     origin = Wide3(none, none, none)
     least, lowest, spot = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Facet(origin, origin, origin)
@@ -238,8 +239,7 @@ def _refine(view: View, q: Point3, n: int, candidates: Candidates) -> tuple[floa
         least = size if k == 0 or less(size, least).h < 0.0 else least
         lowest = low if k == 0 or less(low, lowest).h < 0.0 else lowest
     n = retain_below(candidates, n, least.h + ROUNDING)
-    error = less(least, lowest).h + ROUNDING
-    return _rounded(least, error, view.unit), n
+    return least, less(least, lowest).h + ROUNDING, n
 
 
 @called
@@ -336,17 +336,15 @@ def _decide(
         distance, bound = distance_to(
             _scaled(triangle_of(mesh, pairs[0, 0]), view.unit), scaled(q, view.unit), pairs[0, 2]
         )
-        value = _rounded(distance, bound, view.unit)
     else:
-        value, n = _refine(view, q, n, candidates)
+        distance, bound, n = _refine(view, q, n, candidates)
+    value = _rounded(distance, bound, view.unit)
     if value < 0.0 and is_over and feature_under(mesh, pairs[0, 0], q) == FACE:
         for k in range(foot.shape[0]):
             foot[k] = start[0, k]
         return 0.0, 1, True
     if goal.limit < np.inf:
-        if value < 0.0 or value == goal.limit:
-            return -1.0, n, False
-        return (0.0 if value < goal.limit else np.inf), n, False
+        return compare_with_limit(view, q, n, candidates, distance, bound, goal.limit, unit), n, False
     is_named = goal.is_named and value >= 0.0
     if is_named:
         is_named = _certify(view, q, n, is_certain, room, start[0], pose.translations[0], foot)

@@ -17,6 +17,7 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.triangle_triangle import Facet, corner, projected
 from engine.compiling.jit import called, inline
 from engine.distance.closed_forms import Wide, Wide3, over, root
+from engine.distance.exact_within import between
 from engine.distance.refined import View, corners_of
 from engine.predicates.error_free import fma, two_diff, two_prod, two_sum
 from engine.predicates.orientation import orient2d, orient3d
@@ -192,12 +193,6 @@ def _reach(u: Wide3) -> float:
 
 
 @inline
-def _between(a: Point3, b: Point3) -> Wide3:
-    """Return b - a, exact."""
-    return Wide3(Wide(*two_diff(b.x, a.x)), Wide(*two_diff(b.y, a.y)), Wide(*two_diff(b.z, a.z)))
-
-
-@inline
 def _product(a: Wide, b: Wide) -> tuple[float, float]:
     """Return a b as its rounded leading part and the rest."""
     p, low = two_prod(a.h, b.h)
@@ -307,21 +302,21 @@ def distance_to(t: Facet, q: Point3, code: int) -> tuple[Wide, float]:
     its rounding, root and quotient by 2^-99 of itself more. Where that would decide too little, below a millionth of
     A U V, a . n is the determinant in three levels."""
     corner_, other = corner(t, code % 3), corner(t, code % 3 + 1)
-    a = _between(q, corner_)
+    a = between(q, corner_)
     if code < 3:
         size = root(_dot(a, a))
         return size, 2.0**-99 * size.h
-    u, reach = _between(corner_, other), _reach(a)
+    u, reach = between(corner_, other), _reach(a)
     if code < FACE:
         normal, size = _cross(a, u), root(_dot(u, u))
         distance = over(root(_dot(normal, normal)), size)
         return distance, 2.0**-97 * reach * _reach(u) / size.h + 2.0**-97 * distance.h
-    v = _between(t.p, t.r)
+    v = between(t.p, t.r)
     normal, lengths = _cross(u, v), _reach(u) * _reach(v)
     size = root(_dot(normal, normal))
     rough = a.x.h * normal.x.h + a.y.h * normal.y.h + a.z.h * normal.z.h
     if abs(rough) < 2.0**-20 * reach * lengths:
-        height, error = _determinant(Facet(a, _between(q, t.q), _between(q, t.r)))
+        height, error = _determinant(Facet(a, between(q, t.q), between(q, t.r)))
     else:
         height, error = _dot(a, normal), 2.0**-97 * reach * lengths
     distance = over(height, size)
