@@ -255,13 +255,18 @@ def _locate_exactly(
         for first, end in zip([0, *ends.tolist()], ends.tolist())
         for begin in range(first, end, _MOST_IN_GROUP)
     ]
-    counts = []
+    counts, locators = [], []
+    for (
+        begin,
+        end,
+    ) in groups:  # order: the choice depends on what a solid was asked before, so it is not left to threads
+        budget.check()
+        locators.append(scene.locator(int(bodies[order[begin]])).chosen(end - begin, budget))
 
     def task(first: int, last: int) -> None:
-        for begin, end in groups[first:last]:
+        for (begin, end), locator in zip(groups[first:last], locators[first:last]):
             places = order[begin:end]
             located = np.empty(end - begin, np.int8)
-            locator = scene.locator(int(bodies[places[0]])).chosen(end - begin, budget)
             counts.append(locator.fill(points[owners[places]], located, budget))
             locations[places] = located
 
