@@ -247,7 +247,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "Pose.from_matrix": {"matrix": np.eye(4), "tolerance": 1e-12, "rounded": False},
     "Scene": {"solids": [BOX], "poses": [None]},
     "Scene.moved": {"self": SCENE, "poses": {0: POSE}},
-    "Scene.distances": {"self": SCENE, "points": POINT},
+    "Scene.distances": {"self": SCENE, "points": POINT, "within": 1.0},
     "distances": {"points": POINT, "solid": BOX, "to": "boundary", "within": 1.0, "pose": POSE},
     "Scene.locate": {"self": SCENE, "points": POINT},
     "Scene.collide": {"self": SCENE, "moved": [1], "skip": None, "only": None, "gap": 0.5},

@@ -75,7 +75,7 @@ async def test_lines_of_the_plane_in_place_of_a_solid(client: httpx.AsyncClient,
         ({"lines": WAYS, "solid": BOX}, ""),
         ({"lines": []}, "/lines"),
         ({"lines": [WAYS[0], [[1, 1]]]}, "/lines/1"),
-        ({"lines": [[[0, 0, 0], [1, 1, 1]]]}, "/lines/0"),
+        ({"lines": [[[0, 0, 0], [1, 1, 1]]]}, "/lines/0/0"),
         ({"lines": WAYS, "signed": True}, "/signed"),
     ],
 )
