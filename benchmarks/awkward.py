@@ -7,16 +7,17 @@ from itertools import product
 import numpy as np
 
 import engine
+from benchmarks.bodies import random_rotations
+from benchmarks.workloads import ring_around
 
 Array = np.ndarray
 Net = tuple[Array, Array]
 """Vertices (n, 3) and triangles (m, 3), outward."""
 
 
-def turned(points: Array, seed: int = 3) -> Array:
+def turned(points: Array) -> Array:
     """Return points under one random rotation."""
-    turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    return points @ (turn * np.sign(np.linalg.det(turn))).T
+    return points @ random_rotations(np.random.default_rng(3), 1)[0].T
 
 
 def torus(n: int, stretch: tuple[float, float, float] = (1, 1, 1)) -> Net:
@@ -70,16 +71,15 @@ def spiky(n: int) -> Net:
     return np.where(far[:, None], 5.0 * points, points), faces
 
 
-def boxes_in_rows(n: int, step: float = 1.0) -> list[engine.Solid]:
-    """Return n boxes on a grid; with step 1 they touch."""
+def boxes_in_rows(n: int) -> list[engine.Aabb]:
+    """Return n boxes on a grid, which touch."""
     k = round(n ** (1 / 3))
-    return [engine.Aabb(np.multiply(at, step), np.multiply(at, step) + 1.0) for at in product(range(k), repeat=3)]
+    return [engine.Aabb(at, np.add(at, 1.0)) for at in product(range(k), repeat=3)]
 
 
 def unit_circle(n: int) -> Array:
     """Return n points around the origin."""
-    angles = np.arange(n) * 2 * np.pi / n
-    return np.column_stack([np.cos(angles), np.sin(angles)])
+    return ring_around(np.arange(n) * 2 * np.pi / n)
 
 
 def star(n: int, inner: float = 0.1) -> Array:
@@ -105,14 +105,6 @@ def zigzag(n: int) -> Array:
     """Return a ring of n corners, two of three on the line y = 0."""
     x = np.linspace(0.0, 1.0, n)
     return np.concatenate([np.column_stack([x, np.where(np.arange(n) % 3, 0.0, -0.1)]), [[1.0, 1.0], [0.0, 1.0]]])
-
-
-def parcels(n: int, shift: float = 0.0) -> list[Array]:
-    """Return about n four-cornered rings that share their sides; shift: how far corners are moved off the grid."""
-    k = round(n**0.5)
-    corners = np.stack(np.meshgrid(np.arange(k + 1.0), np.arange(k + 1.0), indexing="ij"), -1)
-    corners += np.random.default_rng(n).uniform(-shift, shift, corners.shape)
-    return [corners[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]] for i in range(k) for j in range(k)]
 
 
 def ngon(n: int) -> engine.Convex:

@@ -12,8 +12,6 @@ below 2 ms say nothing of growth. Peers are asked where they are installed: shap
 from __future__ import annotations
 
 import argparse
-import importlib
-import importlib.util
 from collections.abc import Callable
 from functools import partial
 from math import log
@@ -22,13 +20,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import engine
-from benchmarks import awkward
+from benchmarks import awkward, contenders
+from benchmarks.answers.shapes import BOX, corners
+from benchmarks.contenders import Placed
 from benchmarks.measure import clocked
+from benchmarks.polygon_pairs import parcels
+from benchmarks.workloads import Mesh, Rings
+
+try:
+    import shapely
+except ImportError:
+    shapely = None  # type: ignore[assignment]
 
 EXPONENT, PEER, LEAST = 1.35, 3.0, 2e-3
 UNIT = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 Ask = Callable[[], object]
-has = lambda name: importlib.util.find_spec(name) is not None  # noqa: E731
 
 
 class Family(NamedTuple):
@@ -47,25 +53,18 @@ def _solid(net: awkward.Net) -> engine.Polyhedron:
     return engine.Polyhedron(*net)
 
 
-def _shape(ring: Any, *holes: Any) -> Any:
-    return importlib.import_module("shapely").Polygon(ring, holes)
+def _peer(module: str, kind: str, subject: Any, items: Any, is_new: bool = False) -> Ask | None:
+    """Return a question to a contender, None where its package is not installed; is_new: the build is part of it."""
+    try:
+        made = contenders.make(module, kind, subject, 1)
+    except (ImportError, OSError):
+        return None
+    if is_new:
+        return partial(contenders.answers, module, kind, subject, items)
+    return partial(made.ask, made.native(items))
 
 
 # --- points -----------------------------------------------------------------------------------------------------------
-
-
-def _occupancy(net: awkward.Net, points: np.ndarray) -> Ask | None:
-    """Return a question to Open3D that builds its tree too."""
-    if not has("open3d"):
-        return None
-    o3d = importlib.import_module("open3d")
-
-    def ask() -> object:
-        scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        scene.add_triangles(o3d.core.Tensor(net[0].astype(np.float32)), o3d.core.Tensor(net[1].astype(np.uint32)))
-        return scene.compute_occupancy(o3d.core.Tensor(points.astype(np.float32)), nthreads=1)
-
-    return ask
 
 
 def _points_in_fresh_mesh(
@@ -74,7 +73,9 @@ def _points_in_fresh_mesh(
     net = shape(n)
     points = _draw(n).uniform(net[0].min(0), net[0].max(0), (2000, 3))
     points = net[0][_draw(n).integers(len(net[0]), size=2000)] if at_vertices else points
-    return lambda: engine.locate(points, _solid(net), workers=1), _occupancy(net, points)
+    return lambda: engine.locate(points, _solid(net), workers=1), _peer(
+        "open3d", "points", Mesh("", *net), points, True
+    )
 
 
 def _points_on_one_face(n: int) -> tuple[Ask, None]:
@@ -91,15 +92,7 @@ def _points_in_fresh_polygon(
     if is_one_by_one:
         few, polygon = points[:200, None], engine.Polygon([ring])
         return lambda: [engine.locate(point, polygon) for point in few], None
-    if not has("shapely"):
-        return lambda: engine.locate(points, engine.Polygon([ring]), workers=1), None
-    shapely = importlib.import_module("shapely")
-
-    def peer() -> object:
-        shape = _shape(ring)
-        shapely.prepare(shape)
-        return shapely.intersects_xy(shape, points[:, 0], points[:, 1])
-
+    peer = _peer("shapely", "points", Rings("", [ring]), points, True)
     return lambda: engine.locate(points, engine.Polygon([ring]), workers=1), peer
 
 
@@ -117,11 +110,8 @@ def _segments(shape: Callable[[int], awkward.Net], n: int, along_edges: bool = F
 def _segments_along_a_side(n: int) -> tuple[Ask, Ask | None]:
     ring, segments = awkward.zigzag(n), np.repeat([[[-1.0, 0.0], [2.0, 0.0]]], 20, 0)
     polygon = engine.Polygon([ring])
-    if not has("shapely"):
-        return lambda: engine.clip_segments(segments, polygon, workers=1), None
-    shapely = importlib.import_module("shapely")
-    lines, shape = shapely.linestrings(segments), _shape(ring)
-    return lambda: engine.clip_segments(segments, polygon, workers=1), lambda: shapely.intersection(lines, shape)
+    peer = _peer("shapely", "pieces", Rings("", [ring]), segments)
+    return lambda: engine.clip_segments(segments, polygon, workers=1), peer
 
 
 def _segments_through(bodies: Callable[[int], list[engine.Solid]], n: int) -> tuple[Ask, None]:
@@ -133,37 +123,14 @@ def _segments_through(bodies: Callable[[int], list[engine.Solid]], n: int) -> tu
 # --- bodies -----------------------------------------------------------------------------------------------------------
 
 
-def _coal(net: awkward.Net, other: awkward.Net, move: Any, is_distance: bool) -> Ask | None:
-    """Return a question to coal; models are made beforehand."""
-    if not has("coal"):
-        return None
-    coal = importlib.import_module("coal")
-
-    def model(vertices: np.ndarray, faces: np.ndarray) -> Any:
-        made = coal.BVHModelOBBRSS()
-        made.beginModel(len(faces), len(vertices))
-        corners, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-        for vertex in vertices:
-            corners.append(vertex)
-        for face in faces.tolist():
-            triangles.append(coal.Triangle(*face))
-        made.addSubModel(corners, triangles)
-        made.endModel()
-        return made
-
-    first, second, still, there = model(*net), model(*other), coal.Transform3s(), coal.Transform3s()
-    there.setTranslation(np.array(move, float))
-    if is_distance:
-        return lambda: coal.distance(first, still, second, there, coal.DistanceRequest(), coal.DistanceResult())
-    return lambda: coal.collide(first, still, second, there, coal.CollisionRequest(), coal.CollisionResult())
-
-
 def _two(shape: Callable[[int], awkward.Net], move: Any, n: int, is_distance: bool = False) -> tuple[Ask, Ask | None]:
     net = shape(n)
     first, second = _solid(net), _solid(net)
     pose = engine.Pose(np.eye(3), move(net) if callable(move) else move)
+    couple = Placed(Mesh("", *net)), Placed(Mesh("", *net), (np.eye(3), pose.translation))
     ask = engine.clearance if is_distance else engine.collide
-    return partial(ask, first, second, second_pose=pose), _coal(net, net, pose.translation, is_distance)
+    peer = _peer("coal", "clearance pairs", None, [couple]) if is_distance else _peer("coal", "pair", couple, None)
+    return partial(ask, first, second, second_pose=pose), peer
 
 
 def _apex(gap: float, net: awkward.Net) -> np.ndarray:
@@ -177,12 +144,7 @@ def _scene(bodies: Callable[[int], list[engine.Solid]], n: int) -> tuple[Ask, No
 
 def _cubes(n: int) -> list[engine.Solid]:
     """Boxes that touch, as meshes."""
-    corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
-    quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
-    faces = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
-    return [
-        engine.Polyhedron(corners + box.min, faces) for box in awkward.boxes_in_rows(n) if isinstance(box, engine.Aabb)
-    ]
+    return [engine.Polyhedron(corners(box.min, box.max), BOX) for box in awkward.boxes_in_rows(n)]
 
 
 def _one_and_many(n: int) -> list[engine.Solid]:
@@ -193,28 +155,26 @@ def _one_and_many(n: int) -> list[engine.Solid]:
 
 
 def _parcels(shift: float, n: int) -> tuple[Ask, Ask | None]:
-    rings = awkward.parcels(n, shift)
+    rings = parcels(n, n, shift)
     polygons = [engine.Polygon([ring]) for ring in rings]
-    if not has("shapely"):
-        return lambda: engine.collide_scene(polygons, workers=1), None
-    shapely = importlib.import_module("shapely")
-    shapes = np.array([_shape(ring) for ring in rings])
-    return (
-        lambda: engine.collide_scene(polygons, workers=1),
-        lambda: shapely.STRtree(shapes).query(shapes, predicate="intersects"),
-    )
+    ask = partial(engine.collide_scene, polygons, workers=1)
+    if shapely is None:
+        return ask, None
+    shapes = shapely.polygons(rings)
+    return ask, lambda: shapely.STRtree(shapes).query(shapes, predicate="intersects")
 
 
 def _rings(name: str, first: np.ndarray, second: np.ndarray) -> tuple[Ask, Ask | None]:
     """Two polygons of one ring each; name: collide, clearance or an operation of overlay."""
     a, b = engine.Polygon([first]), engine.Polygon([second])
-    asks = {"collide": lambda: engine.collide(a, b), "clearance": lambda: engine.clearance(a, b)}
-    ask = asks.get(name, lambda: engine.overlay(a, b, name))
-    if not has("shapely"):
-        return ask, None
-    x, y = _shape(first), _shape(second)
-    peers = {"collide": lambda: x.relate(y), "clearance": lambda: x.distance(y)}
-    return ask, peers.get(name, lambda: getattr(x, name)(y))
+    couple = Placed(Rings("", [first])), Placed(Rings("", [second]))
+    if name == "collide":
+        layers = first[None], second[None]
+        return partial(engine.collide, a, b), _peer("shapely", "relations of polygons", layers, np.zeros((1, 2), int))
+    if name == "clearance":
+        return partial(engine.clearance, a, b), _peer("shapely", "clearance pairs", None, [couple])
+    peer = _peer("shapely", "overlay of made", name, [([first], [second])])
+    return lambda: engine.overlay(a, b, name), peer  # type: ignore[arg-type]
 
 
 def _side_by_side(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -227,17 +187,15 @@ def _moved(ring: np.ndarray, x: float, y: float) -> tuple[np.ndarray, np.ndarray
     return ring, ring + np.array([x, y])
 
 
-def _union(rings: Callable[[int], list[np.ndarray]], n: int) -> tuple[Ask, Ask | None]:
+def _union(rings: Callable[[int], Any], n: int) -> tuple[Ask, Ask | None]:
     made = rings(n)
     polygons = [engine.Polygon([ring]) for ring in made]
-    if not has("shapely"):
-        return lambda: engine.union_all(polygons, workers=1), None
-    shapely, shapes = importlib.import_module("shapely"), [_shape(ring) for ring in made]
-    return lambda: engine.union_all(polygons, workers=1), lambda: shapely.union_all(shapes)
+    peer = None if shapely is None else partial(shapely.union_all, [shapely.Polygon(ring) for ring in made])
+    return partial(engine.union_all, polygons, workers=1), peer
 
 
 def _clipped(ring: np.ndarray, region: engine.Solid, outline: np.ndarray) -> tuple[Ask, Ask | None]:
-    peer = partial(_shape(ring).buffer(0).intersection, _shape(outline)) if has("shapely") else None
+    peer = _peer("shapely", "overlay of made", "intersection", [([ring], [outline])])
     return lambda: engine.clip_polygons([[ring]], region, workers=1), peer
 
 
@@ -298,7 +256,7 @@ FAMILIES = [
     Family("overlay: equal combs", 1000, lambda n: _rings("union", awkward.comb(n), awkward.comb(n))),
     Family("overlay: spirals", 500, lambda n: _rings("intersection", *_moved(awkward.spiral(n), 0.313, 0.177))),
     Family("overlay: stars", 500, lambda n: _rings("union", *_moved(awkward.star(n, 1.0 - 2.0 / n), 0.31, 0.17))),
-    Family("union_all: parcels", 256, partial(_union, awkward.parcels)),
+    Family("union_all: parcels", 256, partial(_union, lambda n: parcels(n, n, 0.0))),
     Family("union_all: equal squares", 250, partial(_union, lambda n: [UNIT] * n)),
     Family("union_all: nested circles", 100,
            partial(_union, lambda n: [awkward.unit_circle(32) * k for k in range(1, n)])),

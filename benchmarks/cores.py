@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import resource
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
@@ -24,6 +23,7 @@ import orjson
 import engine
 from benchmarks import load, machine
 from benchmarks.bodies import random_rotations
+from benchmarks.measure import clocked
 from benchmarks.polygon_pairs import small
 from benchmarks.wire import SPHERE, serving
 from benchmarks.workloads import bumpy_sphere, generator, mesh_of_size, points_in_box, star_polygon, star_rings
@@ -95,11 +95,6 @@ def _digest(answer: Any) -> str:
     return summed.hexdigest()
 
 
-def _cpu() -> float:
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
-
-
 def measure(question: Question, counts: list[int | None]) -> dict[str, Any]:
     """Return the least wall and CPU seconds by number of workers, and whether all answers have the same bytes."""
     wall: dict[str, list[float]] = {str(count or "default"): [] for count in counts}
@@ -107,11 +102,8 @@ def measure(question: Question, counts: list[int | None]) -> dict[str, Any]:
     digests = {_digest(question(count)) for count in counts}
     for turn in range(ROUNDS):
         for name, count in list(zip(wall, counts))[:: 1 if turn % 2 else -1]:
-            before, used = time.perf_counter(), _cpu()
-            answer = question(count)
-            wall[name].append(time.perf_counter() - before)
-            cpu[name].append(_cpu() - used)
-            del answer
+            for kept, took in zip((wall, cpu), clocked(lambda count=count: question(count))):
+                kept[name].append(took)
     least = {name: min(seconds) for name, seconds in wall.items()}
     one, most = least[str(counts[0])], list(least)[-1]
     return {
@@ -170,12 +162,7 @@ def over_dask(seed: int) -> dict[str, dict[str, float]]:
 
 
 def _least(question: Callable[[], Any]) -> float:
-    took = []
-    for _ in range(3):
-        before = time.perf_counter()
-        question()
-        took.append(time.perf_counter() - before)
-    return min(took)
+    return min(clocked(question)[0] for _ in range(3))
 
 
 def main(words: list[str]) -> int:
