@@ -19,7 +19,7 @@ try:
     from tests.reference.collision import relation
     from tests.reference.contact import segment_meets_triangle, triangles_meet
     from tests.reference.cutting import cut_volume, nearest, points_of, signed_volume
-    from tests.reference.distance import distance
+    from tests.reference.distance import distance, squared_distance
     from tests.reference.exact import Q, nearest_double, nearest_double_with_root, sub, vector
     from tests.reference.many_points import locate_points
     from tests.reference.overlay import overlay, signed_area
@@ -181,6 +181,24 @@ def exact_distances(couples: Any) -> np.ndarray:
     """Return the doubles nearest to the distances of pairs of bodies without poses, 0 if they meet."""
     result = [distance(*(document(body.shape) for body in couple)) for couple in couples]
     return np.array([0.0 if each is None else nearest_double_with_root(-each[1], Q(1), each[0]) for each in result])
+
+
+def squares_from(points: np.ndarray, mesh: Mesh) -> list[Any]:
+    """Return the exact squared distances of points from a mesh. Faces whose boxes are certainly farther away than the
+    nearest vertex are left out."""
+    corners, result = mesh.vertices[mesh.faces], []
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    for point in points:
+        nearest = np.linalg.norm(mesh.vertices - point, axis=1).min() * (1 + _PADDING)
+        near = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0.0), axis=1) <= nearest
+        faces = [tuple(map(vector, face)) for face in corners[near].tolist()]
+        result.append(min(squared_distance(face, (vector(point.tolist()),)) for face in faces))
+    return result
+
+
+def distances_from(points: np.ndarray, mesh: Mesh) -> np.ndarray:
+    """Return the doubles nearest to the distances of points from a mesh."""
+    return np.array([nearest_double_with_root(Q(0), Q(1), square) for square in squares_from(points, mesh)])
 
 
 def first_pieces(segments: np.ndarray, region: Any) -> np.ndarray:

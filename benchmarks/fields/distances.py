@@ -6,7 +6,7 @@ All are judged by rational arithmetic, easy rows on their first points.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -14,15 +14,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.contest import Contest, Goals, Size, Task, field_of
-from benchmarks.errors import distances, same
+from benchmarks.errors import distances, distances_from, same, squares_from
 from benchmarks.workloads import Mesh, bumpy_sphere, document, generator, points_in_box
-from engine.predicates.rational import cross, dot, minus, nearest_with_root
 
 PEERS: dict[str, Goals] = {"open3d": (1.25, 2.0), "igl": (1.25, 2.0), "trimesh": (None, None)}
 GAPS = {"on the surface": 0.0, "1e-12 away": 1e-12, "1e-9 away": 1e-9, "1e-6 away": 1e-6}
 """How far hard points are from the surface, over its radius, before their coordinates are rounded."""
 LIMIT = 0.125
-Vector = Sequence[Any]
 
 
 def tasks(size: Size) -> Iterator[Task]:
@@ -53,7 +51,7 @@ def _easy(size: Size, name: str, times: int, is_near: bool) -> Contest:
     points = points_in_box(mesh, n, size.seed)
     if is_near:
         points = beside(mesh, 1e-3, n, generator(f"distances {name}", size.seed))
-    exact = _exact(points[: size.n(200, 12)], mesh)
+    exact = distances_from(points[: size.n(200, 12)], mesh)
     about = f"{len(mesh.faces):,} faces, points {'at a thousandth of the radius' if is_near else 'of the box'}"
     name = f"{name} faces, {'near' if is_near else 'in the box'}"
     return Contest("distances", name, False, points, exact, distances, field_of("point distances", mesh, PEERS, 1),
@@ -66,11 +64,11 @@ def _hard(size: Size, name: str, gap: float) -> Contest:
 
     def moved(step: float) -> tuple[np.ndarray, np.ndarray]:
         other = beside(mesh, step, len(points), generator(f"distances {step}", size.seed))
-        return other, _exact(other, mesh)
+        return other, distances_from(other, mesh)
 
     about = f"{len(mesh.faces)} faces, points off them by {gap:g} of the radius before rounding; a distance is wrong "
     about += "when it is off by more than a millionth of itself"
-    exact = _exact(points, mesh)
+    exact = distances_from(points, mesh)
     return Contest("distances", name, True, points, exact, distances,
                    field_of("point distances", mesh, tuple(PEERS), 1), about, request=partial(asked, mesh, points),
                    moved=None if gap else moved, near=float(np.median(exact)) / 2.0)  # fmt: skip
@@ -79,7 +77,7 @@ def _hard(size: Size, name: str, gap: float) -> Contest:
 def _within(size: Size) -> Contest:
     mesh = bumpy_sphere("distances", 1, 1)
     points = beside(mesh, LIMIT, size.n(200, 12), generator("distances within", size.seed))
-    exact = np.array([square <= Fraction(LIMIT) ** 2 for square in squares(points, mesh)])
+    exact = np.array([square <= Fraction(LIMIT) ** 2 for square in squares_from(points, mesh)])
 
     def within(item: int) -> tuple[str, dict[str, Any]]:
         path, question = asked(mesh, points, item)
@@ -88,39 +86,3 @@ def _within(size: Size) -> Contest:
     about = f"points off faces by {LIMIT} up to rounding: are they at most so far away?"
     return Contest("distances", "within the distance itself", True, points, exact, same,
                    field_of("points within", (mesh, LIMIT), tuple(PEERS), 1), about, request=within)  # fmt: skip
-
-
-def _exact(points: np.ndarray, mesh: Mesh) -> np.ndarray:
-    """Return the doubles nearest to the distances."""
-    return np.array(
-        [nearest_with_root(0, 1, s.numerator * s.denominator, s.denominator) for s in squares(points, mesh)]
-    )
-
-
-def squares(points: np.ndarray, mesh: Mesh) -> list[Fraction]:
-    """Return the exact squared distances of points from a mesh. Faces whose boxes are certainly farther away than the
-    nearest vertex are left out."""
-    corners, result = mesh.vertices[mesh.faces], []
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    for point in points:
-        nearest = np.linalg.norm(mesh.vertices - point, axis=1).min() * (1 + 1e-9)
-        near = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0.0), axis=1) <= nearest
-        p = [Fraction(x) for x in point.tolist()]
-        faces = [[[Fraction(x) for x in corner] for corner in face] for face in corners[near].tolist()]
-        result.append(min(_square([minus(corner, p) for corner in face]) for face in faces))
-    return result
-
-
-def _square(corners: Sequence[Vector]) -> Fraction:
-    """Return the squared distance of a triangle from the origin."""
-    a, b, c = corners
-    normal = cross(minus(b, a), minus(c, a))
-    if all(dot(normal, cross(corners[k], corners[(k + 1) % 3])) >= 0 for k in range(3)):
-        return Fraction(dot(a, normal)) ** 2 / dot(normal, normal)
-    result = []
-    for k in range(3):
-        start, way = corners[k], minus(corners[(k + 1) % 3], corners[k])
-        t = min(max(Fraction(-dot(start, way)) / dot(way, way), Fraction(0)), Fraction(1))
-        foot = [x + t * y for x, y in zip(start, way)]
-        result.append(Fraction(dot(foot, foot)))
-    return min(result)
