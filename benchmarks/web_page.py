@@ -239,7 +239,7 @@ def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:
     words = "contenders differ from the exact engine"
     facts = [(f"{len(wrong)} of {len(others)}", "bad" if wrong else "good", words, "contenders differ")]
     if wrong:
-        worst = wrong[-1]["contender"]
+        worst = shown(wrong[-1]["contender"])
         facts.append(
             (
                 percent(error_share(wrong[-1])),

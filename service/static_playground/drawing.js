@@ -73,7 +73,7 @@ export function prepared2d(items, colors) {
 
 export function styleColors() {
   const probe = document.body.appendChild(document.createElement("span")), colors = {};
-  for (const name of ["first", "second", "inside", "boundary", "outside", "kept", "wrong", "stage"]) {
+  for (const name of ["first", "second", "inside", "boundary", "outside", "kept", "wrong"]) {
     probe.style.color = `var(--${name})`;
     colors[name] = getComputedStyle(probe).color.match(/[\d.]+/g).slice(0, 3).map(Number);
   }

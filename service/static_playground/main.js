@@ -8,7 +8,7 @@ import { Lens, boundaryNear, lattice } from "./lens.js";
 import { History, fragment, readFragment, restore, snapshot } from "./links.js";
 import { isMesh, readMesh } from "./mesh_files.js";
 import { positions, readText, toWkt } from "./own.js";
-import { QUESTIONS, secondPose } from "./questions.js";
+import { QUESTIONS, named, secondPose } from "./questions.js";
 import { curl, showFigures, showRequest, shownRequest } from "./showing.js";
 import { solid_types } from "./solids.js";
 import { View2D } from "./view2d.js";
@@ -231,7 +231,7 @@ async function once() {
   $("stage").classList.remove("old");
   shown = other ? { [path]: answer, [next.path]: other } : answer;
   if (other?.methods && $("method").options.length !== other.methods.length) {
-    $("method").replaceChildren(...other.methods.map((name) => new Option(name, name, false, name === other.method)));
+    $("method").replaceChildren(...other.methods.map((name) => new Option(named(name), name, false, name === other.method)));
   }
   const figures = { ...question.figures(now, answer, other), ...also?.figures };
   showFigures(figures, answer.accuracy, timing, seconds, items);
@@ -309,7 +309,7 @@ function showPicture(now, drawn) {
     views.plane.show(prepared2d(framed(drawn, now.frame), colors), { corners: rings.flatMap(({ at }) => at), edges, count, grid: now.snap ? 0.25 : 0 });
   } else if (views.space) {
     const { turns, middle } = QUESTIONS[now.question], canTurn = turns || now.question === "collide";
-    views.space.show(prepared3d(drawn, now.frame, colors), { back: colors.stage.map((v) => v / 255), count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null });
+    views.space.show(prepared3d(drawn, now.frame, colors), { count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null });
     if (now.question === "proof" && !past.past.length) views.space.spin();
   }
 }

@@ -108,6 +108,9 @@ function besideFaces({ vertices, faces }, n) {
   });
 }
 
+// What everybody calls a method of the textbook.
+export const named = (method) => (method === "half-line" ? "ray casting" : method);
+
 export const QUESTIONS = {
   proof: {
     hint: (dimension) => (dimension === 3
@@ -129,12 +132,12 @@ export const QUESTIONS = {
       const inside = contained.filter(Boolean).length - boundary.length;
       return {
         inside, boundary: boundary.length, outside: contained.length - inside - boundary.length,
-        "plain float64, wrong": `${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} (${method})`,
+        "plain float64, wrong": `${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} (${named(method)})`,
         "exact beside float64": times(seconds_exact / seconds_plain),
       };
     },
-    verdict: (state, { contained }, figures, { differing, method }) => `Plain float64 (${method}): ${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} points wrong`,
-    labels: ({ contained }, { differing, method }) => [`exact: ${contained.length.toLocaleString("en")} right`, `plain float64 (${method}): ${differing.length.toLocaleString("en")} wrong`],
+    verdict: (state, { contained }, figures, { differing, method }) => `Plain float64 (${named(method)}): ${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} points wrong`,
+    labels: ({ contained }, { differing, method }) => [`exact: ${contained.length.toLocaleString("en")} right`, `plain float64 (${named(method)}): ${differing.length.toLocaleString("en")} wrong`],
     draw(state, { contained, boundary }, { solid, points: list }, { differing }) {
       const on = new Set(boundary), wrong = new Set(differing), isFlat = state.dimension === 2;
       const items = isFlat ? [{ kind: "rings", rings: solid.rings, color: "first", fill: 0.2 }] : solid3d(state.first, "first", 0.35);

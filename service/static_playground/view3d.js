@@ -39,7 +39,7 @@ export class View3D {
   constructor(canvas, { onMove, onTurn, onTurnEnd }) {
     this.canvas = canvas;
     this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false });
-    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, radius: 2.1, items: [], panes: 1, rings: null, buffers: new Map(), back: [0, 0, 0], late: 0 });
+    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, radius: 2.1, items: [], panes: 1, rings: null, buffers: new Map(), back: backOf(canvas), late: 0 });
     if (!this.gl) throw new Error("this browser has no WebGL 2; the 2D pictures work without it");
     [this.mesh, this.lines, this.points] = [MESH, LINES, POINTS].map((source) => program(this.gl, ...source));
     const fingers = new Fingers(canvas);
@@ -139,13 +139,13 @@ export class View3D {
 
   // items: {kind: "triangles" | "lines" | "points", positions: Float32Array, color: [r, g, b, a], width?, onTop?, pose?, pane?};
   // rings: {middle, radius} of the body that can be turned by them
-  show(items, { back, count = 1, rings = null, radius = 2.1 }) {
+  show(items, { count = 1, rings = null, radius = 2.1 }) {
     const used = new Set(items.map(({ positions }) => positions));
     for (const [positions, buffer] of this.buffers) if (!used.has(positions)) { this.gl.deleteBuffer(buffer); this.buffers.delete(positions); }
     const circles = rings ? ringsAround(rings).map((ring, k) => ({
       kind: "lines", positions: new Float32Array(ring.slice(1).flatMap((p, i) => [...ring[i], ...p])), color: [0, 1, 2].map((j) => (j === k ? 0.85 : 0.3)).concat(0.9), width: 2,
     })) : [];
-    Object.assign(this, { items: [...items, ...circles], panes: count, rings, radius, back });
+    Object.assign(this, { items: [...items, ...circles], panes: count, rings, radius, back: backOf(this.canvas) });
     this.draw();
   }
 
@@ -210,6 +210,10 @@ export class View3D {
     else gl.drawArrays(item.kind === "points" ? gl.POINTS : gl.TRIANGLES, 0, n);
     names.forEach((name) => gl.disableVertexAttribArray(gl.getAttribLocation(unit, name)));
   }
+}
+
+function backOf(canvas) {
+  return getComputedStyle(canvas.parentElement).backgroundColor.match(/[\d.]+/g).slice(0, 3).map((v) => v / 255);
 }
 
 function ringsAround({ middle, radius }) {

@@ -339,7 +339,7 @@ def test_the_first_view_shows_where_plain_floats_are_wrong(page: Any, dimension:
     labels = page.locator("#labels span").all_inner_texts()
     assert labels == [
         f"exact: {len(asked['points'])} right",
-        f"plain float64 (half-line): {len(compared.differing)} wrong",
+        f"plain float64 (ray casting): {len(compared.differing)} wrong",
     ]
     if dimension == 2:
         page.select_option("#method", "same side")
@@ -625,6 +625,17 @@ def test_a_body_is_turned_by_the_ring_around_it(page: Any) -> None:
     assert np.abs(rotation - np.eye(3)).max() > 0.05
     assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
     page.fill("#turn", "0")
+
+
+def test_before_the_first_answer_the_picture_has_the_colour_of_its_stage(page: Any) -> None:
+    other = page.context.new_page()
+    other.route("**/v1/**", lambda _: None)  # no answer comes
+    other.goto(page.evaluate("location.origin") + "/")
+    other.wait_for_timeout(500)
+    picture = Image.open(io.BytesIO(other.locator("#view3d").screenshot())).convert("RGB")
+    stage = re.findall(r"\d+", other.evaluate("getComputedStyle(stage).backgroundColor"))
+    assert picture.getpixel((picture.width // 2, picture.height // 2)) == tuple(map(int, stage))
+    other.close()
 
 
 def test_it_turns_until_it_is_taken_in_hand_and_not_for_those_who_want_less_motion(page: Any) -> None:
