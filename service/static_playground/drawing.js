@@ -32,13 +32,12 @@ const arrays = new WeakMap(); // of triangles in a frame, by mesh
 
 function triangles(mesh, frame) {
   const kept = arrays.get(mesh);
-  if (kept?.frame === frame) return kept.positions;
-  const { vertices, faces } = mesh, positions = new Float32Array(9 * faces.reduce((sum, face) => sum + Math.max(0, face.length - 2), 0));
-  const seen = vertices.map((p) => toView(frame, p));
-  let place = 0;
-  for (const face of faces) for (let i = 2; i < face.length; i++) for (const corner of [face[0], face[i - 1], face[i]]) for (const v of seen[corner]) positions[place++] = v;
-  arrays.set(mesh, { frame, positions });
-  return positions;
+  if (kept?.frame === frame) return kept;
+  const positions = new Float32Array(mesh.vertices.flatMap((p) => toView(frame, p)));
+  const indices = new Uint32Array(mesh.faces.flatMap((face) => face.slice(2).flatMap((corner, i) => [face[0], face[i + 1], corner])));
+  const made = { frame, positions, indices };
+  arrays.set(mesh, made);
+  return made;
 }
 
 // A closed ring in space, filled as a fan and outlined, before everything else.
@@ -62,7 +61,7 @@ export function outlines(rings, color, width, fill) {
 export function prepared3d(items, frame, colors) {
   return items.map(({ kind, points, lines, mesh, pose, color, alpha = 1, width, onTop, pane }) => ({
     kind, width, onTop, pane, color: [...colors[color].map((v) => v / 255), alpha],
-    positions: mesh ? triangles(mesh, frame) : new Float32Array((points ?? lines.flat()).flatMap((p) => toView(frame, p))),
+    ...(mesh ? triangles(mesh, frame) : { positions: new Float32Array((points ?? lines.flat()).flatMap((p) => toView(frame, p))) }),
     pose: pose && { rotation: pose.rotation, translation: toView(frame, times(pose.rotation, frame.middle).map((v, k) => v + pose.translation[k])) },
   }));
 }

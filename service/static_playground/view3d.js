@@ -140,8 +140,8 @@ export class View3D {
   // items: {kind: "triangles" | "lines" | "points", positions: Float32Array, color: [r, g, b, a], width?, onTop?, pose?, pane?};
   // rings: {middle, radius} of the body that can be turned by them
   show(items, { count = 1, rings = null, radius = 2.1 }) {
-    const used = new Set(items.map(({ positions }) => positions));
-    for (const [positions, buffer] of this.buffers) if (!used.has(positions)) { this.gl.deleteBuffer(buffer); this.buffers.delete(positions); }
+    const used = new Set(items.flatMap(({ positions, indices }) => [positions, indices]));
+    for (const [array, buffer] of this.buffers) if (!used.has(array)) { this.gl.deleteBuffer(buffer); this.buffers.delete(array); }
     const circles = rings ? ringsAround(rings).map((ring, k) => ({
       kind: "lines", positions: new Float32Array(ring.slice(1).flatMap((p, i) => [...ring[i], ...p])), color: [0, 1, 2].map((j) => (j === k ? 0.85 : 0.3)).concat(0.9), width: 2,
     })) : [];
@@ -194,9 +194,8 @@ export class View3D {
     gl.uniform4fv(gl.getUniformLocation(unit, "color"), item.color);
     gl.uniform1f(gl.getUniformLocation(unit, "width"), (item.width ?? 2) * ratio);
     gl.uniform2f(gl.getUniformLocation(unit, "size"), ...size);
-    if (!this.buffers.has(item.positions)) this.buffers.set(item.positions, fill(gl, item.positions));
     gl.bindVertexArray(null);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.get(item.positions));
+    this.bind(gl.ARRAY_BUFFER, item.positions);
     const isLines = item.kind === "lines";
     const names = isLines ? ["from", "to"] : ["position"];
     names.forEach((name, i) => {
@@ -207,8 +206,16 @@ export class View3D {
     });
     const n = item.positions.length / 3;
     if (isLines) gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, n / 2);
+    else if (item.indices) { this.bind(gl.ELEMENT_ARRAY_BUFFER, item.indices); gl.drawElements(gl.TRIANGLES, item.indices.length, gl.UNSIGNED_INT, 0); }
     else gl.drawArrays(item.kind === "points" ? gl.POINTS : gl.TRIANGLES, 0, n);
     names.forEach((name) => gl.disableVertexAttribArray(gl.getAttribLocation(unit, name)));
+  }
+
+  bind(target, array) {
+    const gl = this.gl, isNew = !this.buffers.has(array);
+    if (isNew) this.buffers.set(array, gl.createBuffer());
+    gl.bindBuffer(target, this.buffers.get(array));
+    if (isNew) gl.bufferData(target, array, gl.STATIC_DRAW);
   }
 }
 
@@ -236,11 +243,4 @@ function program(gl, vertex, fragment) {
   }
   gl.linkProgram(unit);
   return unit;
-}
-
-function fill(gl, positions) {
-  const buffer = gl.createBuffer();
-  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-  gl.bufferData(gl.ARRAY_BUFFER, positions, gl.STATIC_DRAW);
-  return buffer;
 }
