@@ -101,22 +101,23 @@ def on_couples(
         couples.extend(some)
         return np.arange(len(couples) - len(some), len(couples)), answers
 
-    made = [replace(_net(each), make=partial(_each, each, couples, len(couples))) for each in result]
+    made = [replace(_net(each), make=partial(on_each, each, couples, len(couples))) for each in result]
     return Contest("collision", name, is_hard, np.arange(len(couples)), exact, same, made, about, request=request,
                    moved=None if moved is None else moved_items, **more)  # fmt: skip
 
 
-def _each(one: Contender, couples: list[Couple], n_first: int) -> Prepared:
-    """Models of the first so many pairs are made at once, those of others when they are asked about."""
+def on_each(one: Contender, subjects: list[Any], n_first: int, refusal: Any = errors.REFUSED) -> Prepared:
+    """Return a contender asked about one subject an item. Models of the first so many are made at once, those of others
+    when they are asked about."""
     module, kind, _, _, *setting = one.make.args  # type: ignore[attr-defined]
 
     @cache
     def call(row: int) -> Any:
-        return make(module, kind, couples[row], 1, *setting).ask
+        return make(module, kind, subjects[row], 1, *setting).ask
 
     for row in range(n_first):
         call(row)
-    return Prepared(lambda rows: np.array([int(refusing(call(int(row)), None)) for row in rows]))
+    return Prepared(lambda rows: np.array([refusing(call(int(row)), None, refusal) for row in rows]))
 
 
 def _bricks(size: Size, is_hard: bool) -> Contest:
@@ -149,14 +150,17 @@ def _neighbours(size: Size, is_hard: bool) -> Contest:
     pairs = errors.boxes_that_meet(left, right)
     result = field_of("relations of polygons", (left, right), ("shapely",), 1)
 
-    def asked(item: int) -> tuple[str, dict[str, Any]]:
-        first, second = (document(workloads.Rings("", [layer[k]])) for layer, k in zip((left, right), pairs[item]))
-        return "/v1/collide", {"first": first, "second": second}
-
     about = f"{len(left)} parcels and {'halves of them, new corners rounded' if is_hard else 'themselves'}: "
     about += "disjoint, touching, overlapping, inside?"
     return Contest("collision", f"neighbours, {'split' if is_hard else 'whole'}", is_hard, pairs,
-                   errors.relations(left, right, pairs), same, result, about, request=asked)  # fmt: skip
+                   errors.relations(left, right, pairs), same, result, about,
+                   request=partial(asked_of_layers, left, right, pairs))  # fmt: skip
+
+
+def asked_of_layers(left: np.ndarray, right: np.ndarray, pairs: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
+    """Return path and body that ask about one pair of two layers."""
+    first, second = (document(workloads.Rings("", [layer[k]])) for layer, k in zip((left, right), pairs[item]))
+    return "/v1/collide", {"first": first, "second": second}
 
 
 def _net(one: Contender) -> Contender:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks import errors
-from benchmarks.contenders import Prepared, make
-from benchmarks.contest import Contender, Contest, Size, Task, field_of, refusing
+from benchmarks.contest import Contest, Size, Task, field_of
+from benchmarks.fields.collision import on_each
 from benchmarks.workloads import Mesh, bumpy_sphere, document, generator
 
 PEERS = {"closed halves": ("trimesh", "manifold3d", "vtk"), "sections": ("trimesh", "vtk")}
@@ -79,18 +79,7 @@ def _volumes(size: Size, place: str) -> Contest:
         balls = [Mesh(ball.name, ball.vertices + draw.uniform(0.5, 1.0, 3) * FAR, ball.faces) for ball in balls]
     exact = np.array([[volume, volume] for volume in map(errors.volume_of, balls)])
     result = field_of("volume", None, ("open3d", "trimesh", "manifold3d", "vtk"), 1)
-    made = [_for_each(each, balls) for each in result]
+    made = [replace(each, make=partial(on_each, each, balls, n, np.nan)) for each in result]
     about = "bumpy balls of 320 faces" + (f", {FAR:.0e} sizes from the origin" if is_hard else "")
     return Contest("cuts", f"volumes, {place}", is_hard, np.arange(n), exact, errors.areas, made, about,
                    request=lambda item: ("/v1/volume", {"solid": document(balls[item])}))  # fmt: skip
-
-
-def _for_each(one: Contender, subjects: list[Mesh]) -> Contender:
-    """Return the contender, asked about one subject an item."""
-    module, kind, _, threads, *_ = one.make.args  # type: ignore[attr-defined]
-
-    def maker() -> Prepared:
-        calls: list[Callable[[Any], Any]] = [make(module, kind, subject, threads).ask for subject in subjects]
-        return Prepared(lambda rows: np.array([float(refusing(calls[row], None, np.nan)) for row in rows]))
-
-    return replace(one, make=maker)

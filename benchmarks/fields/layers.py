@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
 from benchmarks import errors, polygon_pairs
 from benchmarks.contenders import Prepared
 from benchmarks.contest import Contender, Contest, Size, Task, field_of
-from benchmarks.workloads import Rings, document
+from benchmarks.fields.collision import asked_of_layers
 
 PREDICATE = "touches"
 JUDGED = 400
@@ -46,14 +45,11 @@ def _join(size: Size, is_hard: bool) -> Contest:
     made = [replace(each, make=partial(_among, each, pairs, len(right)))
             for each in field_of("join", PREDICATE, ("geopandas",), 1)]  # fmt: skip
 
-    def asked(item: int) -> tuple[str, dict[str, Any]]:
-        first, second = (document(Rings("", [layer[k]])) for layer, k in zip((left, right), pairs[item]))
-        return "/v1/collide", {"first": first, "second": second}
-
     about = f"{len(left)} parcels and " + ("their halves, whose new corners are rounded" if is_hard else "themselves")
     name = f"join of {'split' if is_hard else 'whole'} parcels"
     return Contest("layers", name, is_hard, (left, right), exact, errors.same, made,
-                   f"{about}: does a pair touch, without common area?", count=len(pairs), request=asked)  # fmt: skip
+                   f"{about}: does a pair touch, without common area?", count=len(pairs),
+                   request=partial(asked_of_layers, left, right, pairs))  # fmt: skip
 
 
 def _among(one: Contender, pairs: np.ndarray, n_right: int) -> Prepared:
