@@ -8,7 +8,7 @@ import { Lens, boundaryNear, lattice } from "./lens.js";
 import { History, fragment, readFragment, restore, snapshot } from "./links.js";
 import { isMesh, readMesh } from "./mesh_files.js";
 import { positions, readText, toWkt } from "./own.js";
-import { QUESTIONS, named, secondPose } from "./questions.js";
+import { QUESTIONS, firstItems, named, secondPose } from "./questions.js";
 import { curl, showFigures, showRequest, shownRequest } from "./showing.js";
 import { solid_types } from "./solids.js";
 import { View2D } from "./view2d.js";
@@ -203,7 +203,7 @@ function matrix([w, x, y, z]) {
 
 // --- asking -----------------------------------------------------------------------------------------------------------
 
-let isAsking = false, isStale = false;
+let isAsking = false, isStale = false, isDrawn = false;
 
 async function refresh() {
   isStale = true;
@@ -222,6 +222,8 @@ async function once() {
   readControls();
   const now = { ...state, offset: [...state.offset] }, question = QUESTIONS[now.question];
   for (const solid of [now.first, now.second]) if (solid) await store(solid);
+  if (now.first && !isDrawn) showPicture(now, firstItems(now)); // the answer takes a while where kernels are compiled
+  isDrawn = true;
   const { path, body, items } = question.ask(now), text = JSON.stringify(body);
   showRequest(path, text);
   const next = question.beside?.(now, body), both = [ask(path, text), next && ask(next.path, JSON.stringify(next.body))];

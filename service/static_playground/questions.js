@@ -84,7 +84,7 @@ export function times(ratio) {
   return Math.abs(Math.log(ratio)) < 0.1 ? "takes the same time" : ratio < 1 ? `${factor} times as fast` : `takes ${factor} times as long`;
 }
 
-const firstItems = (state) => (state.dimension === 3 ? solid3d(state.first, "first", 0.3) : solid2d(state.first, "first"));
+export const firstItems = (state) => (state.dimension === 3 ? solid3d(state.first, "first", 0.3) : solid2d(state.first, "first"));
 
 // The doubles nearest to points on the edges of rings: as near to the boundary as data that was snapped to it.
 function onEdges(list, n) {
