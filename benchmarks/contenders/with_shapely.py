@@ -37,11 +37,12 @@ def even_odd(rings: list[np.ndarray]) -> Any:
 
 
 def _read(path: str) -> tuple[list[Any]]:
-    made = shapely.from_geojson(Path(path).read_text("utf-8"))
+    read = shapely.from_wkt if path.endswith(".wkt") else shapely.from_geojson
+    made = read(Path(path).read_text("utf-8"))
     return ([list(ring.coords)[:-1] for ring in (made.exterior, *made.interiors)],)
 
 
-READERS = {".geojson": _read}
+READERS = dict.fromkeys((".geojson", ".wkt"), _read)
 
 
 def _points(subject: Rings, threads: int) -> Prepared:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import re
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
@@ -101,7 +102,14 @@ def _our_rings(path: str) -> tuple[list[Any]]:
     return ([ring[:-1] for ring in feature["geometry"]["coordinates"]],)
 
 
-OUR_READERS = {f".{name}": engine.read_mesh for name in ("stl", "obj", "off", "ply", "glb")} | {".geojson": _our_rings}
+def _rings_of_wkt(path: str) -> tuple[list[Any]]:
+    rings = re.findall(r"\(([^()]+)\)", Path(path).read_text("utf-8"))
+    return ([[list(map(float, point.split())) for point in ring.split(",")[:-1]] for ring in rings],)
+
+
+OUR_READERS = {f".{name}": engine.read_mesh for name in ("stl", "obj", "off", "ply", "glb")} | {
+    ".geojson": _our_rings, ".wkt": _rings_of_wkt,
+}  # fmt: skip
 
 
 def kind_of(case: Case) -> str:

@@ -30,12 +30,12 @@ def test_cases_are_distinct_and_name_their_threads() -> None:
 
 
 def test_cases_are_read_from_files() -> None:
-    """At least twelve, of six formats; every file is used, and the numbers asked about are those that stand in it."""
+    """At least twelve, of seven formats; every file is used, and the numbers asked about are those that stand in it."""
     named = {case["id"]: museum.files_of(case) for case in CASES}
     files = {name for names in named.values() for name in names}
     assert sum(map(bool, named.values())) >= 12
     assert files == {path.name for path in FILES.iterdir()}
-    assert {Path(name).suffix for name in files} == {".stl", ".obj", ".off", ".ply", ".glb", ".geojson"}
+    assert {Path(name).suffix for name in files} == {".stl", ".obj", ".off", ".ply", ".glb", ".geojson", ".wkt"}
     for case in CASES:
         for key, solid in case["given"].items():
             if isinstance(solid, dict) and not solid.get("file", ".glb").endswith(".glb"):  # GLB: float32 in octets
