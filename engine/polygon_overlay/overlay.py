@@ -372,13 +372,14 @@ def _arrange_all(
     accuracy report. grid: spacing to which the result is snapped."""
     each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
     flat = polygon_arrays_of(each) if each else PolygonArrays(*NO_RINGS, one_polygon(0))
-    joined = union_of_coverage(flat, budget) if rule == Rule.ANY and grid is None else None
+    n, joined = len(flat.vertices), union_of_coverage(flat, budget) if rule == Rule.ANY and grid is None else None
     if joined is not None:
         result, n_exact, n_rational = *joined, 0
     else:
+        flat = flat.without_repeats() if rule == Rule.ANY else flat  # each pair of their edges would be one contact
         n_rings = np.diff(flat.polygon_offsets)  # polygons without rings have no number: a ring's is at least its own
         nesting = Nesting(np.repeat(np.cumsum(n_rings > 0) - 1, n_rings), np.zeros(0), int(rule))
         rings = RingArrays(*flat[:2])
         result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)
     object.__setattr__(result, "_starts", flat.ring_offsets[flat.polygon_offsets[1:-1]])
-    return result, accuracy_of(ulps_moved(result), len(flat.vertices), n_exact, n_rational)
+    return result, accuracy_of(ulps_moved(result), n, n_exact, n_rational)

@@ -147,6 +147,27 @@ class PolygonArrays(NamedTuple):
         """Return one polygon for each group k, with the rings of polygons groups[k] .. groups[k + 1] - 1."""
         return self._replace(polygon_offsets=read_only(self.polygon_offsets[groups]))
 
+    def without_repeats(self) -> PolygonArrays:
+        """Return the polygons with those that equal an earlier one, number by number, without rings."""
+        sizes = self.sizes()
+        filled = np.flatnonzero(sizes)
+        keys = np.column_stack([self.vertices[self.ring_offsets[self.polygon_offsets[filled]]], sizes[filled]])
+        order = np.lexsort(keys.T)
+        is_alike = np.append(False, (keys[order[1:]] == keys[order[:-1]]).all(axis=1))[: len(order)]
+        stays, known = np.ones(len(sizes), np.bool_), set[tuple[bytes, bytes]]()
+        for number in np.sort(filled[order[is_alike | np.append(is_alike[1:], False)[: len(order)]]]).tolist():
+            ends = self.ring_offsets[self.polygon_offsets[number] : self.polygon_offsets[number + 1] + 1]
+            rings = self.vertices[ends[0] : ends[-1]].tobytes(), (ends - ends[0]).tobytes()
+            stays[number] = rings not in known
+            known.add(rings)
+        if stays.all():
+            return self
+        n_rings = np.diff(self.polygon_offsets)
+        of_rings = np.repeat(stays, n_rings)
+        of_vertices = np.repeat(of_rings, np.diff(self.ring_offsets))
+        vertices, offsets = read_only(self.vertices[of_vertices]), summed(np.diff(self.ring_offsets)[of_rings])
+        return PolygonArrays(vertices, offsets, summed(n_rings * stays))
+
     def sizes(self) -> IntArray:
         """Return the number of vertices of each polygon."""
         starts = self.ring_offsets[self.polygon_offsets]
