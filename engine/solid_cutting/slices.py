@@ -58,27 +58,22 @@ def rank_vertices(
 
 
 @kernel
-def count_faces(triangles: IntArray, ranks: IntArray, counts: IntArray, flag: FlagArray) -> None:
-    """Add to counts (planes + 2,) the faces that cross plane k at k + 2."""
+def sort_faces(
+    triangles: IntArray, ranks: IntArray, is_counting: bool, places: IntArray, crossing: IntArray, flag: FlagArray
+) -> None:
+    """Add to places (planes + 2,) the faces that cross plane k at k + 2, if is_counting; else fill crossing with the
+    faces that cross each plane, plane by plane, ascending, those of plane k from where places has k + 1, which is moved
+    to where they end."""
     for face in range(triangles.shape[0]):
         if face & _POLL == 0 and flag[0] != 0:
             return
         a, b, c = ranks[triangles[face, 0]], ranks[triangles[face, 1]], ranks[triangles[face, 2]]
         for plane in range(min(a, b, c), max(a, b, c)):
-            counts[plane + 2] += 1
-
-
-@kernel
-def fill_faces(triangles: IntArray, ranks: IntArray, places: IntArray, crossing: IntArray, flag: FlagArray) -> None:
-    """Fill crossing with the faces that cross each plane, plane by plane, ascending. places: where the faces of plane
-    k go at k + 1, which is moved to where they end."""
-    for face in range(triangles.shape[0]):
-        if face & _POLL == 0 and flag[0] != 0:
-            return
-        a, b, c = ranks[triangles[face, 0]], ranks[triangles[face, 1]], ranks[triangles[face, 2]]
-        for plane in range(min(a, b, c), max(a, b, c)):
-            crossing[places[plane + 1]] = face
-            places[plane + 1] += 1
+            if is_counting:
+                places[plane + 2] += 1
+            else:
+                crossing[places[plane + 1]] = face
+                places[plane + 1] += 1
 
 
 @kernel
@@ -166,13 +161,13 @@ def slices_at(
 def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolArray, budget: Budget) -> list[Slice]:
     """Return the sections by parallel planes, numbered along their normal. ranks, is_on: as for `rank_vertices`."""
     faces, firsts = outward(body, budget), np.zeros(len(planes) + 2, np.int64)
-    entry_of(count_faces)(faces, ranks, firsts, budget.flag)
+    entry_of(sort_faces)(faces, ranks, True, firsts, firsts[:0], budget.flag)
     budget.check()
     np.cumsum(firsts, out=firsts)
     n = int(firsts[-1])
     budget.take(_BYTES * n)
     crossing = np.empty(n, np.int64)
-    entry_of(fill_faces)(faces, ranks, firsts, crossing, budget.flag)
+    entry_of(sort_faces)(faces, ranks, False, firsts, crossing, budget.flag)
     budget.check()
     across, is_open = _across(body, faces, budget), np.ones(len(planes), np.bool_)
     shells_of: dict[int, list[Ring]] = defaultdict(list)
