@@ -97,13 +97,14 @@ def of_bodies(
     most, most_faces = sizes[:, 2:].max(axis=0).tolist()
     if most * most_faces > _LARGEST:
         return values
-    places, moves = [which[rows]], list[list[float]]()
+    some, moves = np.zeros((len(rows), 4), np.int64), list[list[float]]()
+    some[:, :2] = which[rows]
     for k, pose in enumerate(poses):
         chosen = rows if isinstance(pose, list) else rows[:1]
-        places.append(len(moves) + np.arange(len(rows))[:, None] * (len(chosen) > 1))
+        some[:, 2 + k] = len(moves) + (np.arange(len(rows)) if len(chosen) > 1 else 0)
         moves += [_numbers_of(pose, pairs[number][k], k, number) for number in chosen.tolist()]
     tables = [read_only(each) for each in (points, np.concatenate(corners), np.concatenate(ends), sizes)]
-    some, turns = read_only(np.concatenate(places, axis=1)), np.array(moves)
+    some, turns = read_only(some), np.array(moves)
     made = np.full(len(rows), np.nan)
 
     def fill(start: int, stop: int) -> None:
@@ -153,8 +154,7 @@ def _body_of(solid: Convex | Polyhedron, budget: Budget) -> Body | None:
 
 
 _BOX_NUMBERS: Final = 5
-_ROWS: Final = 1 << 14
-"""Boxes whose corners are made at once."""
+_LARGE: Final = 2.0**1000
 _COMFORTABLE: Final = 128
 """Exponents of coordinates up to which areas are far from the least and the largest double."""
 _MOST: Final = np.finfo(np.float64).max
@@ -169,13 +169,13 @@ def overlaps_of_arrays(
     first: Any, second: Any, is_ratio: bool, workers: int | None, budget: Budget
 ) -> tuple[FloatArray, int]:
     """Return areas, or their ratios, of arrays (n, k, 2) of polygons or (n, 5) of boxes, and how many took overlays."""
-    sides = [_corners_of(each, name, budget) for name, each in (("first", first), ("second", second))]
+    sides = [_checked(each, name) for name, each in (("first", first), ("second", second))]
     check_same_length(*sides)
     values = np.full(len(sides[0]), np.nan)
     if all(side.shape[1] <= MOST_CORNERS for side in sides):
 
         def fill(start: int, stop: int) -> None:
-            some = [side[start:stop] for side in sides]
+            some = [_as_corners(side[start:stop]) for side in sides]
             scratch = np.empty((4, MOST_CORNERS), np.int64)
             entry_of(overlap_rings)(*some, is_ratio, scratch, values[start:stop], budget.flag)
 
@@ -183,7 +183,7 @@ def overlaps_of_arrays(
     rows = np.flatnonzero(np.isnan(values))
     if not len(rows):
         return values, 0
-    one, other = (side[rows] for side in sides)
+    one, other = (_as_corners(side[rows]) for side in sides)
     if is_ratio:
         one, other = _scaled(one, other)
         pairs = (one, other), (one, _around(one)), (other, _around(other))
@@ -200,15 +200,22 @@ def overlaps_of_arrays(
     return values, len(rows)
 
 
-def _corners_of(each: Any, name: str, budget: Budget) -> FloatArray:
-    """Return an array of polygons (n, k, 2), or of boxes (n, 5), as corners."""
+def _as_corners(side: FloatArray) -> FloatArray:
+    """Return polygons (n, k, 2), or boxes (n, 5), as corners."""
+    if side.ndim == 3:
+        return side
+    corners = np.empty((len(side), 4, 2))
+    entry_of(turn_boxes)(side, np.cos(side[:, 4]), np.sin(side[:, 4]), corners)
+    return read_only(corners)
+
+
+def _checked(each: Any, name: str) -> FloatArray:
+    """Return an array of polygons (n, k, 2), or of boxes (n, 5) whose corners are finite."""
     if each.ndim == 2 and each.shape[1] == _BOX_NUMBERS:
         boxes = as_floats(each, 2, (name,))
-        each = np.empty((len(boxes), 4, 2))
-        for start in range(0, len(boxes), _ROWS):
-            budget.check()
-            some = boxes[start : start + _ROWS]
-            entry_of(turn_boxes)(some, np.cos(some[:, 4]), np.sin(some[:, 4]), each[start : start + _ROWS])
+        if boxes.min(initial=0.0) > -_LARGE and boxes.max(initial=0.0) < _LARGE:
+            return boxes
+        each = _as_corners(boxes)
     corners = as_floats(each, 3, (name,))
     if corners.shape[2] != 2:
         raise WrongDimensionError(f"{name} must hold positions of 2 numbers each, got {corners.shape[2]}", (name,))

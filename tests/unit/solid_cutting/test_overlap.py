@@ -73,8 +73,11 @@ def test_boxes_by_centre_size_and_angle() -> None:
     assert engine.iou(boxes[:1], corners).tolist() == [1.0]  # type: ignore[union-attr]
     turned: Any = engine.overlap_volume(boxes[1:], np.array([[[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]]))
     assert turned == pytest.approx([4.0], rel=1e-14)
-    with pytest.raises(engine.InvalidInputError):
-        engine.iou(np.array([[0.0, 0.0, 1.0, 1.0, np.nan]]), boxes[:1])
+    large = np.array([[0.0, 0.0, 2.0**1020, 2.0**-1000, 0.0]])
+    assert engine.iou(large, large * [1, 1, 0.5, 1, 1]).tolist() == [0.5]  # type: ignore[union-attr]
+    for wrong in ([0.0, 0.0, 1.0, 1.0, np.nan], [1.7e308, 0.0, 1.7e308, 1.0, 0.0]):
+        with pytest.raises(engine.InvalidInputError):
+            engine.iou(np.array([wrong]), boxes[:1])
     with pytest.raises(engine.UnsupportedPairError, match="as many"):
         engine.iou(boxes, boxes[:1])
 
