@@ -76,10 +76,9 @@ def of_bodies(
             if body is not None:
                 numbers[key] = len(boxes) + len(bodies)
                 bodies.append(body)
-    named = [(numbers.get(id(one), -1), numbers.get(id(other), -1)) for one, other in pairs]
-    which = np.array(named, np.int64).reshape(-1, 2)
-    rows: IntArray = np.flatnonzero((which >= 0).all(axis=1))
-    if not len(rows):
+    places = [(numbers.get(id(one), -1), numbers.get(id(other), -1)) for one, other in pairs]
+    rows = [row for row, place in enumerate(places) if min(place) >= 0]
+    if not rows:
         return values
     n, n_corners, n_faces = len(boxes), 8 * len(boxes), 6
     table, corners, ends = [(8 * k, 0, 8, 6) for k in range(n)], [_QUADS], [_QUAD_ENDS]
@@ -97,14 +96,14 @@ def of_bodies(
     most, most_faces = sizes[:, 2:].max(axis=0).tolist()
     if most * most_faces > _LARGEST:
         return values
-    some, moves = np.zeros((len(rows), 4), np.int64), list[list[float]]()
-    some[:, :2] = which[rows]
+    which, moves = np.zeros((len(rows), 4), np.int64), list[list[float]]()
+    which[:, :2] = [places[row] for row in rows]
     for k, pose in enumerate(poses):
         chosen = rows if isinstance(pose, list) else rows[:1]
-        some[:, 2 + k] = len(moves) + (np.arange(len(rows)) if len(chosen) > 1 else 0)
-        moves += [_numbers_of(pose, pairs[number][k], k, number) for number in chosen.tolist()]
+        which[:, 2 + k] = len(moves) + np.arange(len(rows)) if len(chosen) > 1 else len(moves)
+        moves += [_numbers_of(pose, pairs[row][k], k, row) for row in chosen]
     tables = [read_only(each) for each in (points, np.concatenate(corners), np.concatenate(ends), sizes)]
-    some, turns = read_only(some), np.array(moves)
+    some, turns = read_only(which), np.array(moves)
     made = np.full(len(rows), np.nan)
 
     def fill(start: int, stop: int) -> None:
