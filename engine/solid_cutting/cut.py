@@ -11,7 +11,7 @@ from engine.compiling.jit import entry_of
 from engine.errors import EmptyGeometryError, InvalidOperationError, WrongDimensionError
 from engine.polygon_clipping.planes import plan_of
 from engine.predicates.rational import cross, largest_axis, minus, scaled_integers, sign_of
-from engine.running.budget import Budget, Cancel, current, reading
+from engine.running.budget import Budget, Cancel, current
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import cap_of, seen
 from engine.solid_cutting.cut_measures import area_of_cut, volume_of_cut
@@ -26,7 +26,7 @@ from engine.solids.columns import ByValue
 from engine.solids.mesh import Polyhedron
 from engine.solids.primitives import HalfSpace
 from engine.solids.registry import refused, row_of
-from engine.solids.shapes import as_solid
+from engine.solids.shapes import read_argument
 from engine.types import UNDECIDED, Accuracy, FloatArray, IntArray, read_only
 
 _KEEPS: Final = ("inside", "outside", "both")
@@ -192,10 +192,7 @@ def cut(
     if not isinstance(keep, str) or keep not in _KEEPS:
         raise InvalidOperationError(f"keep must be one of {', '.join(_KEEPS)}, got {shown(keep)}", ("keep",))
     body, deadline = as_polyhedron(solid, "cut", deadline, cancel)
-    if not isinstance(region, Solid):
-        with reading(deadline, cancel) as reader:
-            region = as_solid(region, "region")
-        deadline = reader.left()
+    region, deadline = read_argument(region, deadline, cancel, "region")
     check_options(workers, progress, report=report, measures=measures)
     if region.dimension != 3:
         raise WrongDimensionError(f"region is of dimension {region.dimension}; cut takes solids of space", ("region",))

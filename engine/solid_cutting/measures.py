@@ -11,7 +11,7 @@ import numpy as np
 from engine.compiling.jit import entry_of
 from engine.errors import NotRepresentableError, WrongDimensionError
 from engine.predicates.rational import SMALLEST_NORMAL, exponent_of, nearest_float, shifted
-from engine.running.budget import Budget, Cancel, reading
+from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.exact_measures import Measures, exact_centroid, exact_faces, exact_volume, nearest_area
 from engine.solid_cutting.shells import Shells, outward, shells
@@ -20,7 +20,7 @@ from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh, Polyhedron
 from engine.solids.registry import Where, refused, row_of
-from engine.solids.shapes import as_solid
+from engine.solids.shapes import read_argument
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
 T = TypeVar("T")
@@ -208,17 +208,14 @@ def _measured(
     solid: SolidLike, what: str, workers: Any, deadline: float | None, cancel: Cancel | None,
     progress: Progress | None, report: bool,
 ) -> Any:  # fmt: skip
-    if not isinstance(solid, Solid):
-        with reading(deadline, cancel) as reader:
-            solid = as_solid(solid, "solid")
-        deadline = reader.left()
+    body, deadline = read_argument(solid, deadline, cancel)
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        value, is_exact = measure(solid, what, budget)
+        value, is_exact = measure(body, what, budget)
     if progress is not None:
         progress(1)
-    return (value, Accuracy("exact", 0.5, 1, int(is_exact), int(is_exact), solid.type)) if report else value
+    return (value, Accuracy("exact", 0.5, 1, int(is_exact), int(is_exact), body.type)) if report else value
 
 
 def measure(solid: Solid, what: str, budget: Budget, where: Where = ("solid",)) -> tuple[Any, bool]:

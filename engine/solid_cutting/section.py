@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.errors import InvalidArrayError, InvalidInputError, UnsupportedSolidError, ZeroNormalError
 from engine.predicates.rational import cross, dot, minus, scaled_integers, squared_length
-from engine.running.budget import Budget, Cancel, current, polled, reading
+from engine.running.budget import Budget, Cancel, current, polled
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import Area, Seen
 from engine.solid_cutting.cut_measures import area_of_section
@@ -25,7 +25,7 @@ from engine.solids.polygon import Polygon
 from engine.solids.primitives import HalfSpace
 from engine.solids.ragged import Ragged, summed
 from engine.solids.registry import kind_of
-from engine.solids.shapes import as_solid
+from engine.solids.shapes import read_argument
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
 _NO_HEIGHTS: Final = np.zeros(0)
@@ -209,10 +209,7 @@ def as_polyhedron(
     solid: Any, what: str, deadline: float | None, cancel: Cancel | None
 ) -> tuple[Polyhedron, float | None]:
     """Return a polyhedron as it is, or made of what people hold, and the rest of the deadline."""
-    if not isinstance(solid, Solid):
-        with reading(deadline, cancel) as reader:
-            solid = as_solid(solid, "solid")
-        deadline = reader.left()
+    solid, deadline = read_argument(solid, deadline, cancel)
     if not isinstance(solid, Polyhedron):
         more = "; clip_polygons and overlay cut polygons of the plane" if getattr(solid, "dimension", 3) == 2 else ""
         raise UnsupportedSolidError(

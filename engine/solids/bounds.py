@@ -13,7 +13,7 @@ from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
 from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
 from engine.predicates.rational import nearest_float
-from engine.running.budget import Budget, Cancel, reading
+from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
@@ -22,7 +22,7 @@ from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, Sphere, Triangle
 from engine.solids.registry import Box, refused, row_of, unbounded
-from engine.solids.shapes import as_solid
+from engine.solids.shapes import read_argument
 from engine.types import Accuracy, FloatArray
 
 Check: TypeAlias = Callable[[], object] | None
@@ -116,10 +116,7 @@ def bounds(
     >>> box.aabb, box.sphere
     (Aabb(min=[0.0, 0.0], max=[4.0, 3.0]), Sphere(center=[2.0, 1.5], radius=2.5))
     """
-    if not isinstance(solid, Solid):
-        with reading(deadline, cancel) as reader:
-            solid = as_solid(solid, "solid")
-        deadline = reader.left()
+    solid, deadline = read_argument(solid, deadline, cancel)
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         budget.check()

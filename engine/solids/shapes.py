@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError
-from engine.running.budget import Budget, current, polled
+from engine.running.budget import Budget, Cancel, current, polled, reading
 from engine.solids.base import Solid
 from engine.solids.checks import Where, as_points, shown, spell
 from engine.solids.geometries import MEMBERS, as_list, coordinates_of, geometries_in, geometry_of, note_altitude
@@ -58,6 +58,16 @@ def as_solid(value: object, *where: str | int) -> Solid:
         got = f"{type(value).__name__} {shown(value)}"
         raise UnsupportedSolidError(f"{spell(where)} must be a solid, {_TAKEN}; got {got}", where)
     return solid
+
+
+def read_argument(
+    value: object, deadline: float | None, cancel: Cancel | None, where: str = "solid"
+) -> tuple[Solid, float | None]:
+    """Return an argument as `as_solid`, read within a deadline, and what is left of that."""
+    if isinstance(value, Solid):
+        return value, deadline
+    with reading(deadline, cancel) as reader:
+        return as_solid(value, where), reader.left()
 
 
 def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
