@@ -16,7 +16,8 @@ from engine.distance.point_formulas import fill_from_ball, fill_from_planes
 from engine.distance.point_measures import Answers
 from engine.distance.point_mesh import OTHER, Features
 from engine.errors import EmptyGeometryError, NotRepresentableError
-from engine.predicates.rational import are_all_safe, dot, nearest_pair, nearest_with_root
+from engine.predicates.expansion import LARGEST, SMALLEST
+from engine.predicates.rational import dot, nearest_pair, nearest_with_root
 from engine.running.budget import Budget, poll
 from engine.solids.checks import check_finite
 from engine.solids.pose import Pose
@@ -129,7 +130,8 @@ def _ball_numbers(centre: Vector, radius: float, is_exact: bool) -> FloatArray |
     except OverflowError:
         return None
     numbers[6:] = radius, is_exact
-    return numbers if are_all_safe(np.append(numbers[: 2 * d : 2], radius)) else None
+    sizes = [abs(x) for x in (*numbers[: 2 * d : 2].tolist(), radius) if x != 0.0]
+    return numbers if all(SMALLEST <= size <= LARGEST for size in sizes) else None
 
 
 class PlanesMeasure(_ByFormula):
