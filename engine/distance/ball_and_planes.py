@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,11 +57,11 @@ Vector = Sequence[Fraction]
 class _ByFormula:
     """Base of the measures of balls and planes: each point in rational arithmetic."""
 
-    kernels: tuple[Any, ...] = ()
-    """A kernel that decides most distances, with its arguments between span and limit."""
-
     def order(self, _: FloatArray) -> None:
         """As `Measure.order`."""
+
+    def filter(self, points: FloatArray, span: tuple[int, int], answers: Answers, most: float, budget: Budget) -> None:
+        """Fill those distances, and nearest points, that a kernel decides. most: a distance to compare with."""
 
     def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
         """Return the distance of a point from the boundary or, outside, from the solid, its nearest point there, and
@@ -72,11 +72,8 @@ class _ByFormula:
         self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
     ) -> int:
         """As `Measure.fill`."""
-        if not answers.is_named:
-            most = np.inf if limit is None else limit
-            for kernel, *numbers in self.kernels:
-                entry_of(kernel)(points, (start, stop), *numbers, most, answers.distance, budget.flag)
-                budget.check()
+        self.filter(points, (start, stop), answers, np.inf if limit is None else limit, budget)
+        budget.check()
         left = (start + np.flatnonzero(np.isnan(answers.distance[start:stop]))).tolist()
         if left:
             check_finite(points, ("points",))
@@ -108,8 +105,17 @@ class BallMeasure(_ByFormula):
         self.centre, self.radius = image_point(solid.center.tolist(), pose), Fraction(float(solid.radius))
         self.numbers = _ball_numbers(self.centre, float(solid.radius), pose is None)
         """As `nearest_on_ball` takes it; None for numbers that kernels do not take."""
-        if pose is None:
-            self.kernels = ((fill_from_ball, solid.center, float(solid.radius)),)
+
+    def filter(self, points: FloatArray, span: tuple[int, int], answers: Answers, most: float, budget: Budget) -> None:
+        """As `_ByFormula.filter`."""
+        if self.numbers is None:
+            return
+        distance, part = answers.distance, slice(*span)
+        were_open, feet = np.isnan(distance[part]), answers.feet if answers.is_named else np.empty((1, points.shape[1]))
+        address = int(self.numbers.ctypes.data)
+        entry_of(fill_from_ball)(points, span, address, most, distance, feet, answers.is_named, budget.flag)
+        if answers.is_named:
+            answers.codes[part][were_open & ~np.isnan(distance[part])] = -1, 0
 
     def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
         """As `_ByFormula.measured`: |sqrt(s) - r|, and c + (q - c) r / sqrt(s)."""
@@ -147,9 +153,12 @@ class PlanesMeasure(_ByFormula):
         rows = [solid] if isinstance(solid, HalfSpace) else [HalfSpace(r[:-1], r[-1]) for r in solid.planes.tolist()]
         self.rows = [image_half_space(row, pose) for row in rows]
         self.d = solid.dimension
-        if pose is None:
-            own = solid.row[None] if isinstance(solid, HalfSpace) else solid.planes
-            self.kernels = ((fill_from_planes, read_only(own)),)
+        self.own = None if pose is not None else solid.row[None] if isinstance(solid, HalfSpace) else solid.planes
+
+    def filter(self, points: FloatArray, span: tuple[int, int], answers: Answers, most: float, budget: Budget) -> None:
+        """As `_ByFormula.filter`: distances alone, of solids without a pose."""
+        if self.own is not None and not answers.is_named:
+            entry_of(fill_from_planes)(points, span, read_only(self.own), most, answers.distance, budget.flag)
 
     def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
         """As `_ByFormula.measured`."""

@@ -37,26 +37,6 @@ def _answer(distance: Wide, error: float, most: float) -> float:
 
 
 @kernel
-def fill_from_ball(
-    points: FloatArray, span: tuple[int, int], centre: FloatArray, radius: float, most: float, distance: FloatArray,
-    flag: FlagArray,
-) -> None:  # fmt: skip
-    """Fill the NaN entries of distance (n,) for points (n, d) number span[0] .. span[1] - 1: from the sphere about a
-    centre (d,). most: see `_answer`."""
-    for item in range(span[0], span[1]):
-        if distance[item] == distance[item] or flag[0] != 0:
-            continue
-        square, is_usable = Wide(0.0, 0.0), is_safe(radius)
-        for k in range(points.shape[1]):
-            x = Wide(*two_diff(points[item, k], centre[k]))
-            is_usable = is_usable and is_safe(points[item, k]) and is_safe(centre[k])
-            square = plus(square, times(x, x))
-        if is_usable and square.h > 0.0:
-            size = root(square)
-            distance[item] = _answer(less(size, Wide(radius, 0.0)), _BOUND * (size.h + radius), most)
-
-
-@kernel
 def fill_from_planes(
     points: FloatArray, span: tuple[int, int], rows: FloatArray, most: float, distance: FloatArray, flag: FlagArray
 ) -> None:
@@ -97,10 +77,11 @@ def _offset(x: float, centre: FloatArray, k: int) -> Wide:
 
 
 @called
-def nearest_on_ball(ball: int, q: Point3, limit: float, foot: FloatArray) -> float:
-    """Return the double nearest to the distance of a point from a ball, 0.0 strictly inside, -1.0 if left open; given a
-    finite limit 0.0 within it, infinity beyond, else `foot` (d,) is set too. ball: address of (8,), the centre in
-    double-doubles (z 0 in the plane), the radius, and 1.0 if the centre is exact.
+def nearest_on_ball(ball: int, q: Point3, is_solid: bool, limit: float, foot: FloatArray) -> float:
+    """Return the double nearest to the distance of a point from a ball, 0.0 strictly inside, or from its surface; -1.0
+    if left open; given a finite limit 0.0 within it, infinity beyond, else `foot` (d,) is set too, unless it has no
+    places. ball: address of (8,), the centre in double-doubles (z 0 in the plane), the radius, and 1.0 if the centre is
+    exact.
 
     With D the distance of the centre, off by e = 2^-101 M + 2^-99 D, and x an offset, a coordinate of the foot is c + x
     (r / D), off by (r / D) (2^-102 M + e) and 2^-98 (r + M)."""
@@ -112,8 +93,9 @@ def nearest_on_ball(ball: int, q: Point3, limit: float, foot: FloatArray) -> flo
         return -1.0
     far = root(square)
     distance, error = less(far, Wide(radius, 0.0)), 2.0**-101 * size + _BOUND * (far.h + radius)
-    if distance.h < -error:
+    if distance.h < -error and is_solid:
         return 0.0
+    distance = distance if distance.h >= 0.0 else Wide(-distance.h, -distance.low)
     if not (distance.h > 2.0**-500 + error and is_correctly_rounded(distance.h, distance.low, error)):
         return -1.0
     if limit < np.inf:
@@ -131,3 +113,19 @@ def nearest_on_ball(ball: int, q: Point3, limit: float, foot: FloatArray) -> flo
             return -1.0
         foot[k] = end.h + 0.0
     return distance.h
+
+
+@kernel
+def fill_from_ball(
+    points: FloatArray, span: tuple[int, int], ball: int, limit: float, distance: FloatArray, feet: FloatArray,
+    is_named: bool, flag: FlagArray,
+) -> None:  # fmt: skip
+    """Fill the NaN entries of distance (n,) for points (n, d) number span[0] .. span[1] - 1: from the surface of a
+    ball, as `nearest_on_ball` does. is_named: also feet (n, d), which else has a row at least."""
+    for item in range(span[0], span[1]):
+        if distance[item] == distance[item] or flag[0] != 0:
+            continue
+        q = Point3(points[item, 0], points[item, 1], points[item, 2] if points.shape[1] == 3 else 0.0)
+        foot = feet[item if is_named else 0]
+        value = nearest_on_ball(ball, q, False, limit, foot[: points.shape[1] if is_named else 0])
+        distance[item] = value if value >= 0.0 else np.nan

@@ -127,7 +127,7 @@ def _measure(
         if how == FULL:
             return NO_CANDIDATES
     elif row[KIND] == BodyKind.BALL:
-        value, is_in_box = nearest_on_ball(row[SHAPE], q, limit, foot), False
+        value, is_in_box = nearest_on_ball(row[SHAPE], q, True, limit, foot), False
     else:
         is_in_box = False
     best = nearest.distance[item]
