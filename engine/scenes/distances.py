@@ -45,6 +45,8 @@ from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, r
 _ROOM: Final = 1 << 14
 """Notes of a kernel in memory at once, if they are enough for a point."""
 
+_BYTES_OF_NOTE: Final = 32
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SceneDistances(Columns):
@@ -118,6 +120,7 @@ def measure_all(
 
     def task(start: int, stop: int) -> None:
         n_notes = min(max(_ROOM, 2 * scene.n_rows), 2 * scene.n_rows * (stop - start))
+        budget.take(_BYTES_OF_NOTE * n_notes)
         notes = Notes(np.empty((n_notes, 3), np.int64), np.empty(n_notes), np.array([start, 0, 0]))
         room, way, foot, how = thread_room(), new_point_room(1), np.empty(d), NO_ROOM
         while how != DONE:  # bound: each turn answers a point, fills a row, or doubles the room
@@ -128,12 +131,14 @@ def measure_all(
             if how == NO_CANDIDATES:
                 room = new_point_room(2 * len(room.candidates.bounds))
             elif how in (NO_ROOM, DONE):
+                budget.take(_BYTES_OF_NOTE * int(notes.n[1]))
                 left.append((notes.rows[: notes.n[1]].copy(), notes.bounds[: notes.n[1]].copy()))
                 notes.n[1] = 0
             elif notes.n[2] < len(solids):
                 still.prepare(int(notes.n[2]))
             else:
                 moved.prepare(int(notes.n[2]) - len(solids))
+        budget.take(-_BYTES_OF_NOTE * n_notes)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress)
     n_exact = _settle(points, nearest, left, scene, limit, budget, workers) if any(len(rows) for rows, _ in left) else 0
