@@ -58,7 +58,7 @@ class _ByFormula:
     """Base of the measures of balls and planes: each point in rational arithmetic."""
 
     def order(self, _: FloatArray) -> None:
-        """As `Measure.order`."""
+        """Return None: the order of points does not matter here."""
 
     def filter(self, points: FloatArray, span: tuple[int, int], answers: Answers, most: float, budget: Budget) -> None:
         """Fill those distances, and nearest points, that a kernel decides. most: a distance to compare with."""
@@ -71,7 +71,8 @@ class _ByFormula:
     def fill(
         self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
     ) -> int:
-        """As `Measure.fill`."""
+        """Fill the answers as `Measure.fill` says: by kernels where doubles prove the distance, the rest in rational
+        arithmetic."""
         self.filter(points, (start, stop), answers, np.inf if limit is None else limit, budget)
         budget.check()
         left = (start + np.flatnonzero(np.isnan(answers.distance[start:stop]))).tolist()
@@ -89,7 +90,7 @@ class _ByFormula:
         return len(left)
 
     def name(self, codes: IntArray, features: Features) -> None:
-        """As `Measure.name`: the number of the plane as the face."""
+        """Fill ``features.face`` with the number of the plane, the first column of `codes`."""
         is_near = codes[:, 1] >= 0
         features.face[is_near], features.kind[is_near] = codes[is_near, 0], OTHER
 
@@ -161,7 +162,8 @@ class PlanesMeasure(_ByFormula):
             entry_of(fill_from_planes)(points, span, read_only(self.own), most, answers.distance, budget.flag)
 
     def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
-        """As `_ByFormula.measured`."""
+        """Return what `_ByFormula.measured` says, by the nearest plane inside, and by sets of planes outside (see the
+        class)."""
         heights = [(dot(n, point) + offset, dot(n, n)) for n, offset in self.rows]
         if all(h >= 0 for h, _ in heights):
             squares = [h * h / size for h, size in heights]

@@ -216,8 +216,8 @@ def _rank(pair: VertexEdge) -> tuple[int, int, int, int]:
 
 @inline
 def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, bool]:
-    """Return the nearest of the n candidates, ties by the lowest faces; a bound on how much nearer another one may be;
-    and whether the pair of features is proven."""
+    """Return (pair, rival, is_proven): the nearest of the n candidates in `near`, of equal ones that with the lowest
+    faces; a bound on how much nearer another one may be; and whether the pair of features is proven."""
     none, is_proven = Wide(np.inf, 0.0), True
     best, rival = VertexEdge(none, 0.0, True, -1, -1, 0, 0), none
     for row in range(n):

@@ -143,8 +143,8 @@ class TriangleMeasure:
         self, points: FloatArray, placed: FloatArray, shift: int, span: tuple[int, int], answers: Answers,
         limit: float | None, budget: Budget,
     ) -> int:  # fmt: skip
-        """Do so for the points number span[0] .. span[1] - 1 of `placed`, which holds those from number `shift` on, in
-        space."""
+        """Fill `answers` for points number span[0] .. span[1] - 1 of `placed` (m, 3), where point number i of `points`
+        is row i - shift; return how many integers decided. limit: as in `Measure.fill`."""
         goal = _NAMED if answers.is_named else _ANY
         if limit is not None:
             goal = Goal(limit * (1.0 + 2.0**-50) + 5e-324, limit * (1.0 - 2.0**-50), limit, False)

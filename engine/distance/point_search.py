@@ -140,7 +140,8 @@ def limit_of(spot: Spot, most: float) -> float:
 
 @inline
 def bound_boxes(tree: Any, node: int, spot: Spot, bounds: Float32Array, row: int) -> int:
-    """Bound the children of a node as `boxes_within` does."""
+    """Write to row `row` of bounds lower bounds on the distance of a spot from the boxes of a node's children; return
+    the nearest as bits (`boxes_within`, `boxes_toward`)."""
     at = spot.at
     if spot.spread > 0.0:
         return boxes_toward(tree.boxes, node, at.x, at.y, at.z, SLACK * spot.reach, bounds, row)
@@ -173,7 +174,8 @@ def enter_node(tree: Any, node: int, spot: Spot, room: PointRoom, level: int) ->
 
 @inline
 def _bound_block(tree: PointMesh, node: int, spot: Spot, most: float, work: Float32Array) -> int:
-    """Bound the triangles of a block as `triangle_bounds` does."""
+    """Write bounds on the distance of a spot from the triangles of a leaf to `work`; return the mask of those that may
+    be the nearest and within `most` (`triangle_bounds`, `triangles_toward`)."""
     at, slack, most = spot.at, SLACK * spot.reach, most + 2.0**-20 * abs(most) + 1e-37  # rounded to float32
     if spot.spread > 0.0:
         return triangles_toward(tree.blocks, node, at.x, at.y, at.z, slack, spot.spread, most, work)
@@ -184,8 +186,9 @@ def _bound_block(tree: PointMesh, node: int, spot: Spot, most: float, work: Floa
 def _search(
     tree: PointMesh, spot: Spot, most: float, enough: float, room: PointRoom, flag: FlagArray
 ) -> tuple[int, int]:
-    """Fill the candidates; return (outcome, number). CLOSER: a triangle is nearer than `enough`; INTERRUPTED; FULL.
-    Lengths are in tree coordinates."""
+    """Fill ``room.candidates`` with the triangles that may be nearest to a spot, and return (outcome, their number).
+    CLOSER: one is nearer than `enough`, which ends the search; INTERRUPTED: by `flag`; FULL: no room. most, enough: in
+    tree coordinates."""
     candidates, work = room.candidates, room.work
     n_candidates, level, node, limit = 0, 0, 0, limit_of(spot, most)
     while True:  # bound: each node is entered once

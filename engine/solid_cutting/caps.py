@@ -37,13 +37,14 @@ _MOST_STEPS: Final = 12
 
 
 class Seen(NamedTuple):
-    """Points seen against the normal of a plane: two axes, in which counter-clockwise is so about the normal."""
+    """Points projected along the normal of a plane: `axes` are the two coordinates to take, in the order in which
+    counter-clockwise is as seen against the normal."""
 
     points: Points
     axes: tuple[int, int]
 
     def doubles(self, ring: Sequence[int]) -> FloatArray:
-        """Return the rounded positions (n, 2) of points."""
+        """Return the rounded positions (n, 2) of points, given by number."""
         return self.points.rounded(np.array(ring, np.int64))[:, list(self.axes)]
 
     def exact(self, number: int) -> tuple[Fraction, Fraction]:
@@ -61,21 +62,22 @@ class Seen(NamedTuple):
 
 
 class Area(NamedTuple):
-    """A polygon of a plane, by points: a shell and its holes."""
+    """A polygon of a plane: its shell, and its holes, each ring as the numbers of its points."""
 
     shell: Ring
     holes: list[Ring]
 
 
 def seen(points: Points, plane: Plane) -> Seen:
-    """Return how points are seen against the normal of a plane."""
+    """Return the projection of points along the normal of a plane."""
     axis = largest_axis(plane.integers[:3])
     i, j = (axis + 1) % 3, (axis + 2) % 3
     return Seen(points, (i, j) if plane.integers[axis] > 0 else (j, i))
 
 
 def rings_of(view: Seen, chain: IntArray, budget: Budget) -> list[Ring]:
-    """Return the rings of a chain of directed sides (k, 2), each simple in its points."""
+    """Return the closed rings that a chain of directed sides (k, 2) consists of, each as numbers of points, none twice.
+    Sides that run there and back cancel."""
     if not len(chain):
         return []
     order = np.argsort(chain[:, 0])
@@ -99,7 +101,7 @@ def rings_of(view: Seen, chain: IntArray, budget: Budget) -> list[Ring]:
 
 
 def _parted(walk: Ring) -> list[Ring]:
-    """Return a closed walk as rings that come to no point twice."""
+    """Return the simple rings into which a closed walk falls at the points that it passes more than once."""
     rings: list[Ring] = []
     way: Ring = []
     place: dict[int, int] = {}
@@ -115,7 +117,8 @@ def _parted(walk: Ring) -> list[Ring]:
 
 
 def _balanced(view: Seen, chain: IntArray, budget: Budget) -> tuple[IntArray, list[int]]:
-    """Return the sides (k, 2) of a chain that do not cancel, and by side the next one of its ring."""
+    """Return (ends, after): the directed sides (k, 2) of a chain that remain when opposite ones cancel, and for each
+    the number of the side that follows it in its ring."""
     n = int(chain.max()) + 1
     keys, net = np.unique(chain.min(axis=1) * n + chain.max(axis=1), return_inverse=True)
     net = np.bincount(net.reshape(-1), np.sign(chain[:, 1] - chain[:, 0])).astype(np.int64)
@@ -135,7 +138,8 @@ def _balanced(view: Seen, chain: IntArray, budget: Budget) -> tuple[IntArray, li
 
 
 def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoing: list[int]) -> list[tuple[int, int]]:
-    """Return pairs (incoming, outgoing) of sides at a point."""
+    """Return pairs (incoming, outgoing) of sides at a point where several rings meet: each incoming side with the
+    outgoing one that continues its ring, so that rings do not cross there. ends (k, 2): of all sides."""
     x, y = view.exact(point)
     rays: list[tuple[int, Fraction, Fraction, int, bool]] = []
     for side, other in [(k, int(ends[k, 0])) for k in incoming] + [(k, int(ends[k, 1])) for k in outgoing]:
@@ -149,8 +153,8 @@ def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoi
 
 
 def areas_of(view: Seen, rings: list[Ring], budget: Budget, is_exact: bool = False) -> tuple[list[Area], list[Ring]]:
-    """Return rings as polygons with holes, and those without area, each from its leftmost point on. is_exact: decide
-    with fractions which shell has a hole."""
+    """Return rings as polygons with holes, and the rings without area, each from its leftmost point on. is_exact:
+    shells of holes are chosen by fractions, not by rounded positions."""
     rings, signs = oriented(view, rings)
     shells = [ring for ring, sign in zip(rings, signs) if sign > 0]
     areas = [Area(shell, []) for shell in shells]
@@ -180,7 +184,8 @@ def oriented(view: Seen, rings: list[Ring]) -> tuple[list[Ring], list[int]]:
 
 
 def _holder(view: Seen, hole: Ring, shells: list[Ring], is_exact: bool) -> int:
-    """Return the number of the smallest shell that has a corner of a hole within, or an even chance of it on itself."""
+    """Return the index, in `shells`, of the smallest shell around a hole: the first corner of the hole that is not on a
+    shell decides; if all are, the shell counts as around it. is_exact: as in `areas_of`."""
     places = [[view.exact(k) for k in ring] if is_exact else view.doubles(ring).tolist() for ring in (hole, *shells)]
     best, least = 0, None
     for number, ring in enumerate(places[1:]):
@@ -194,7 +199,7 @@ def _holder(view: Seen, hole: Ring, shells: list[Ring], is_exact: bool) -> int:
 
 
 def _side_of(ring: list[Any], corner: Any) -> int:
-    """Return 1 for a point within a ring, -1 for one outside, 0 for one on it."""
+    """Return the location of a position in a ring of positions: 1 inside, 0 on it, -1 outside; exact for fractions."""
     x, y = corner
     is_in = False
     for (ax, ay), (bx, by) in zip(ring, ring[1:] + ring[:1]):
@@ -268,8 +273,8 @@ class _TurnedError(Exception):
 
 
 def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntArray:
-    """Return the triangles (n, 3) of a polygon, checked exactly; is_exact: made with fractions where floats fail.
-    Raises: _TurnedError, or TooComplexError where there is nothing left to try."""
+    """Return the triangles (n, 3) of a polygon, all exactly counter-clockwise. is_exact: made with fractions where
+    floats fail. Raises: _TurnedError where floats do not suffice, TooComplexError where fractions do not either."""
     ring = _joined(view, area, is_exact, budget)
     corners, places = np.array(ring, np.int64), view.doubles(ring)
     span = float(np.ptp(places, axis=0).max())
@@ -286,7 +291,8 @@ def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntA
 
 
 def _joined(view: Seen, area: Area, is_exact: bool, budget: Budget) -> Ring:
-    """Return the rings of a polygon as one, with holes joined by bridges there and back."""
+    """Return the shell and the holes of a polygon as one ring: each hole is joined by a bridge, two sides that run
+    there and back. is_exact: bridges are found with fractions."""
     if not area.holes:
         return area.shell
     rings = [area.shell, *area.holes]
@@ -336,7 +342,7 @@ def _failed(view: Seen, area: Area, is_exact: bool) -> Exception:
 
 
 def _turned_in(view: Seen, corners: IntArray, triangles: IntArray, budget: Budget) -> list[int]:
-    """Return which triangles of corners are clockwise, exactly."""
+    """Return the rows of triangles (n, 3), indices into `corners` (numbers of points), that are clockwise, exactly."""
     high, low = view.points.at(corners)
     is_open = np.empty(len(triangles), np.bool_)
     axes = read_only(np.array(view.axes))

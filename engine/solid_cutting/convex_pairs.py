@@ -61,7 +61,8 @@ Body = namedtuple("Body", "corners rings placed exact planes sides")
 
 @inline
 def _place(points: FloatArray, pose: FloatArray, origin: FloatArray, body: Body) -> float:
-    """Fill placed and exact of a body with corners `points`; return eta."""
+    """Fill ``body.placed`` and ``body.exact`` with the corners (n, 6) under a pose, relative to `origin` (3,); return
+    eta, the bound on the error of a placed coordinate (see the module)."""
     eta, is_posed = 0.0, pose[12] != 0.0
     for axis in range(3):
         r = axis * 3
@@ -101,7 +102,7 @@ def _difference(placed: FloatArray, a: int, b: int, axis: int) -> tuple[float, f
 
 @inline
 def _turn(placed: FloatArray, a: int, b: int, c: int, axis: int) -> tuple[float, float]:
-    """Return (b - a) x (c - a) along an axis, as a double-double."""
+    """Return component `axis` of (b - a) x (c - a) as a double-double; a, b, c: rows of `placed`."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     ph, pl = dd_mul(*_difference(placed, b, a, i), *_difference(placed, c, a, j))
     qh, ql = dd_mul(*_difference(placed, b, a, j), *_difference(placed, c, a, i))
@@ -110,7 +111,8 @@ def _turn(placed: FloatArray, a: int, b: int, c: int, axis: int) -> tuple[float,
 
 @called
 def _set_planes(body: Body, eta: float, span: float) -> bool:
-    """Fill the planes of a body; return False for a face without a sure normal."""
+    """Fill ``body.planes`` from its placed corners; return False if the normal of a face is not certain. eta: error of
+    a placed coordinate; span: bound on all coordinates."""
     placed, corners = body.placed, body.corners
     for face in range(body.planes.shape[0]):
         plane, start, size = body.planes[face], body.rings[face], body.rings[face + 1] - body.rings[face]
@@ -151,7 +153,8 @@ def _set_planes(body: Body, eta: float, span: float) -> bool:
 
 @inline
 def _value(plane: FloatArray, points: FloatArray, at: int) -> tuple[float, float]:
-    """Return how far within a plane a point is, times the length of its normal, as a double-double."""
+    """Return n.(v - x), a double-double: n the normal of a plane, v a point on it, x = points[at]. It is positive
+    inside, the distance times |n|."""
     h, low = plane[_VALUE], plane[_VALUE + 1]
     for axis in range(3):
         ph, pl = dd_mul(plane[axis], plane[axis + 3], points[at, axis], points[at, axis + 3])
@@ -161,9 +164,8 @@ def _value(plane: FloatArray, points: FloatArray, at: int) -> tuple[float, float
 
 @called
 def _find_sides(body: Body, planes: FloatArray) -> bool:
-    """Fill the sides of a body at the planes of the other: 1.0 or -1.0 for corners that are certainly inside or
-    outside, 0.0 for others or, where it is certain, on a plane; return whether all lie outside one of the planes, or on
-    it."""
+    """Fill ``body.sides`` with the certain sides of its corners at `planes` of the other body: 1.0 inside, -1.0
+    outside, 0.0 on the plane or not certain. Return whether one of the planes has the whole body outside or on it."""
     placed = body.placed
     for face in range(planes.shape[0]):
         plane, is_beside = planes[face], True
@@ -196,8 +198,8 @@ def _is_within(plane: FloatArray, polygon: FloatArray, n: int) -> bool:
 
 @inline
 def _cut(plane: FloatArray, polygon: FloatArray, n: int, made: FloatArray, extent: float) -> tuple[int, float]:
-    """Write what a plane leaves of a polygon of n corners to `made`; return how many corners it has, -1 for a polygon
-    that may be in the plane, and a bound on twice the area that is wrong."""
+    """Clip a polygon of n corners by a plane, and write the rest to `made`; return its number of corners, -1 if the
+    polygon may lie in the plane, and a bound on twice the area that is wrong. extent: of the polygon."""
     least = most = 0.0
     for k in range(n):
         h, low = _value(plane, polygon, k)
@@ -231,9 +233,9 @@ def _add_cone(
     polygon: FloatArray, n: int, axis: int, height: tuple[float, float, float], wrong: float, share: float,
     sums: FloatArray, at: int,
 ) -> None:  # fmt: skip
-    """Add 6 volumes of the cone from the origin over a polygon, seen along an axis, to sums[at : at + 3], a
-    double-double and a bound. height: n.v / n_k (high, low), and its error; wrong: error of twice the area; share: of
-    the product."""
+    """Add share times 6 volumes of the cone from the origin over a polygon of n corners to sums[at : at + 3], a
+    double-double and its error bound. axis: along which the polygon is projected; height: n.v / n_k of its plane (high,
+    low) and the error of that; wrong: error of twice its area."""
     h, low = 0.0, 0.0
     for k in range(1, n - 1):
         ph, pl = _turn(polygon, 0, k, k + 1, axis)
@@ -249,9 +251,9 @@ def _add_cone(
 def _add_faces(
     own: Body, other: Body, polygons: FloatArray, numbers: tuple[float, float, bool], sums: FloatArray
 ) -> bool:
-    """Add the faces of a body, cut by the planes of the other, to sums[0:3], 6 volumes as a double-double and a bound,
-    and uncut to sums[3:6]; return False where a face may be in a plane. numbers: D, eta, whether it is the first
-    body."""
+    """Add to sums[0:3] six volumes of the cones over the faces of `own` that are clipped by the planes of `other`, as a
+    double-double and a bound, and to sums[3:6] those over the unclipped faces; return False where a face may lie in a
+    plane of the other. polygons: scratch; numbers: D and eta of the module, and whether `own` is the first body."""
     (span, eta, is_first), placed, corners, n_others = numbers, own.placed, own.corners, other.planes.shape[0]
     share = 32.0 * (own.planes.shape[0] + n_others) * U2
     for face in range(own.planes.shape[0]):
@@ -300,7 +302,7 @@ def _add_faces(
 
 @inline
 def _reach(placed: FloatArray, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return the least and the greatest dot product of a body's corners and a direction."""
+    """Return the least and the largest dot product of the direction (x, y, z) with corners `placed` (n, 6), rounded."""
     low = high = x * placed[0, 0] + y * placed[0, 1] + z * placed[0, 2]
     for k in range(1, placed.shape[0]):
         at = x * placed[k, 0] + y * placed[k, 1] + z * placed[k, 2]
@@ -310,8 +312,8 @@ def _reach(placed: FloatArray, x: float, y: float, z: float) -> tuple[float, flo
 
 @called
 def _has_axis(own: Body, other: Body, margin: float) -> bool:
-    """Return whether a plane at right angles to an edge of each body certainly has them on different sides. margin: a
-    bound on the error of a product, over the size of the direction."""
+    """Return whether the cross product of an edge of each body certainly separates the two. margin: bound on the error
+    of a dot product with a direction, relative to its size."""
     p, q = own.placed, other.placed
     for ring in range(own.planes.shape[0]):
         for start in range(own.rings[ring], own.rings[ring + 1]):
@@ -337,7 +339,8 @@ def _has_axis(own: Body, other: Body, margin: float) -> bool:
 def _value_of_pair(
     own: Body, other: Body, polygons: FloatArray, errors: tuple[float, float], is_ratio: bool, sums: FloatArray
 ) -> float:
-    """Return the value of one pair of placed bodies. errors: eta, D."""
+    """Return the common volume of two placed bodies, or its ratio to that of the union (is_ratio), as the nearest
+    double; NaN if not certain. errors: eta and D of the module; polygons, sums: scratch."""
     eta, span = errors
     margin = 2.0**-48 * span + 4.0 * eta
     for axis in range(3):

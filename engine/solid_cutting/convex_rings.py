@@ -46,7 +46,8 @@ Sums = tuple[float, float, float, float]
 
 @inline
 def _copy_turned(rings: FloatArray, item: int, x: FloatArray, y: FloatArray) -> bool:
-    """Copy a ring counter-clockwise; return whether it is proven to be strictly convex."""
+    """Copy ring `item` of rings (n, k, 2), turned counter-clockwise, to x and y; return whether it is proven strictly
+    convex."""
     n, n_left, n_right, n_turns = rings.shape[1], 0, 0, 0
     j = n - 1
     ux, uy = rings[item, j, 0] - rings[item, j - 1, 0], rings[item, j, 1] - rings[item, j - 1, 1]

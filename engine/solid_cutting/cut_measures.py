@@ -39,7 +39,8 @@ Whole = tuple[int, int, int]
 
 
 def _cut_off(points: Points, numbers: Iterable[int], bits: int) -> tuple[dict[int, Whole], int, int]:
-    """Return the coordinates of points in units of 2^-k, rounded, k, and the largest of them."""
+    """Return (places, k, most): the coordinates of some points, by number, truncated to integers in units of 2^-k; k,
+    such that the largest have about `bits` bits; and a bound on their magnitudes."""
     k, numbers = bits - int(np.frexp(points.size)[1]), list(numbers)
     places: dict[int, Whole] = {}
     if bits == _BITS[0] and points.is_in_range:  # points are known to 1 / 8 of a unit
@@ -62,7 +63,8 @@ Ends = Callable[[int], tuple[Fraction, Fraction]]
 
 
 def narrowed(ends_of: Callable[[int], Any], rounded: Callable[[Any], float] = nearest_float) -> float | None:
-    """Return what both ends of a value round to, with as many bits as it takes; None beyond the last of `_BITS`."""
+    """Return the double to which both ends of an enclosure round, once enough bits are spent; None beyond `MOST_BITS`.
+    ends_of(bits): the enclosure; rounded: rounds one end."""
     for bits in _BITS:
         try:
             low, high = map(rounded, ends_of(bits))
@@ -74,19 +76,19 @@ def narrowed(ends_of: Callable[[int], Any], rounded: Callable[[Any], float] = ne
 
 
 def _parted(points: Points, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the triangles for kernels, and those for integers."""
+    """Return the triangles whose corners are all vertices of the solid, which kernels can sum up, and the others."""
     is_new = (triangles >= points.n_given).any(axis=1) if points.is_in_range else np.ones(len(triangles), np.bool_)
     return read_only(triangles[~is_new]), triangles[is_new]
 
 
 def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: Fraction = Fraction(1)) -> float:
-    """Return factor times the volume of a closed mesh of points, its faces outwards."""
+    """Return the double nearest to factor times the volume within a closed mesh of points, whose faces look outward."""
     value = narrowed(volume_between(points, triangles, budget, factor))
     return nearest_float(factor * volume_in_fractions(points, triangles)) if value is None else value
 
 
 def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: Fraction) -> Ends:
-    """Return what `volume_of_cut` is between."""
+    """Return the enclosure of factor times the volume of a closed mesh, as a function of the bits spent on it."""
     given, others = _parted(points, triangles)
     z0 = float(points.vertices[given[0, 0], 2]) if len(given) else 0.0
     sums = np.zeros((1, 3))
@@ -115,7 +117,7 @@ def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: 
 
 
 def volume_in_fractions(points: Points, triangles: IntArray) -> Fraction:
-    """Return the volume of a closed mesh of points, its faces outwards."""
+    """Return the exact volume within a closed mesh of points, whose faces look outward."""
     return exact_volume(_as_fractions(points, triangles)) if len(triangles) else Fraction(0)
 
 

@@ -123,7 +123,7 @@ def nearest_root_over(v: int, w: int, z: int) -> float:
 
 
 def nearest_multiple_of_pi(factor: Fraction) -> float:
-    """Return the double nearest to factor pi, for factor >= 0."""
+    """Return the double nearest to factor times pi, factor >= 0 exact."""
     bits = 64
     while factor:  # bound: pi is irrational
         bits *= 2

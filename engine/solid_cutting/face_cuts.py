@@ -26,8 +26,8 @@ _POLL = 0x3FFF
 
 @kernel
 def find_sides(vertices: FloatArray, row: FloatArray, is_exact: bool, sides: Int8Array, flag: FlagArray) -> int:
-    """Fill sides (n,) with the sign of the plane `row` (4,) at each vertex; return how many are UNDECIDED.
-    is_exact: the row is not rounded."""
+    """Fill sides (n,) with the sign of plane `row` (4,) at each vertex (n, 3), positive inside; return how many stay
+    UNDECIDED. is_exact: the row is not rounded."""
     plane, n_open = HalfSpace3(row[0], row[1], row[2], row[3]), 0
     for vertex in range(vertices.shape[0]):
         if vertex & _POLL == 0 and flag[0] != 0:
@@ -65,9 +65,9 @@ def cut_edges(
     vertices: FloatArray, edges: IntArray, rows: FloatArray, which: IntArray, high: FloatArray, low: FloatArray,
     is_nearest: BoolArray,
 ) -> None:  # fmt: skip
-    """Fill high and low (n, 3) with the points where edges (n, 2) of vertices cross their planes, which (n,) of `rows`
-    (k, 4), and is_nearest (n,) with whether all of high is certain to be the nearest double, and low the rest, to
-    2^-84."""
+    """Fill high and low (n, 3) with the crossings of edges (n, 2) of vertices and planes: edge k with row which[k] of
+    `rows` (m, 4); high + low is a double-double, good to 2^-84. is_nearest (n,): whether all three numbers of high are
+    certainly the nearest doubles."""
     for item in range(edges.shape[0]):
         p, q = edges[item, 0], edges[item, 1]
         row = rows[which[item]]
@@ -95,11 +95,10 @@ def cut_edges(
 def find_turned(
     high: FloatArray, low: FloatArray, size: float, triangles: IntArray, axes: IntArray, is_open: BoolArray
 ) -> None:
-    """Fill is_open (n,) with whether the turn of each triangle of points high + low, on two axes, is not proven to be
-    left. size: a bound of coordinates; they are known to 2^-84 of it.
+    """Fill is_open (n,): whether triangle k of points high + low, projected on axes[k], is not proven to be
+    counter-clockwise. size: bound on coordinates, which are known to 2^-84 of it.
 
-    Differences are off by 2^-83 of that and 4 u^2; products and their difference add 20 u^2.
-    """
+    Differences are off by 2^-83 of that and 4 u^2; products and their difference add 20 u^2."""
     i, j, off = axes[0], axes[1], 2.0**-82 * size
     for item in range(triangles.shape[0]):
         a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
@@ -168,7 +167,8 @@ def find_shapes(
 
 @inline
 def _is_beside(points: FloatArray, faces: IntArray, face: int, other: int) -> bool:
-    """Return whether all corners of `other` that are not corners of `face` lie strictly on one side of its plane."""
+    """Return whether all corners of face `other` that are not corners of `face` lie strictly on one side of the plane
+    of `face`."""
     a, b, c = corners_of(points, faces, face)
     side = 0
     for k in range(3):

@@ -25,9 +25,14 @@ from engine.types import FloatArray, IntArray, read_only
 
 
 class Edges(NamedTuple):
-    """The different edges of triangles.
+    """The distinct edges of a mesh of m triangles.
 
-    ends (k, 2), ascending; of: (m, 3) the edge of each side; uses (k,); net (k,) uses upward less those downward.
+    | field | shape | meaning |
+    |---|---|---|
+    | ends | (k, 2) | vertices of each, ascending |
+    | of | (m, 3) | the edge of each side of each triangle |
+    | uses | (k,) | how many sides are on it |
+    | net | (k,) | sides that run from the lower to the higher vertex minus those that run back |
     """
 
     ends: IntArray
@@ -47,7 +52,7 @@ def edges_of(faces: IntArray) -> Edges:
 
 
 def are_flat(points: FloatArray, faces: IntArray, budget: Budget) -> Any:
-    """Return for each triangle whether its corners are on one line, exactly: a bound of the floats decides most."""
+    """Return (m,) bool: whether the corners of a triangle are on one line, exactly."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     with np.errstate(all="ignore"):
         u, v = b - a, c - a
@@ -63,7 +68,8 @@ def are_flat(points: FloatArray, faces: IntArray, budget: Budget) -> Any:
 
 
 def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
-    """Return the open edges (k, 2), each with a vertex of another that is exactly on it, along the edge in order."""
+    """Return the T-junctions (k, 2) of open edges `ends` (n, 2): an edge, and a vertex of another one that lies exactly
+    in its interior; vertices of one edge in their order along it."""
     vertices = np.unique(ends)
     corners = np.concatenate([points[ends], points[vertices][:, None].repeat(2, axis=1)])
     n = len(ends)
@@ -82,7 +88,7 @@ def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
 
 
 def shells_of(edges: Edges, budget: Budget) -> list[IntArray]:
-    """Return the faces of each part that hangs together by edges, by smallest labels that spread."""
+    """Return the connected parts of a mesh (faces joined by edges), each as the numbers of its faces."""
     labels = np.arange(len(edges.of))
     while True:  # bound: labels only fall; pointers are halved each turn
         budget.check()
@@ -99,7 +105,7 @@ def shells_of(edges: Edges, budget: Budget) -> list[IntArray]:
 
 
 def sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
-    """Return the sign of the volume that triangles run around, exactly."""
+    """Return the sign of the signed volume of closed triangles, exactly: 1 if they face outward."""
     with np.errstate(all="ignore"):
         corners = points[faces] - points[faces[0, 0]]
         parts = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
@@ -114,8 +120,8 @@ def sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
 def crossings(
     points: FloatArray, faces: IntArray, solid_faces: IntArray, at_edges: IntArray, budget: Budget
 ) -> IntArray:
-    """Return the pairs of faces, of those that have area, with a common point besides their common corners and
-    edges."""
+    """Return the pairs of faces (k, 2) that have a common point besides their common corners and edges. solid_faces:
+    the numbers of the faces that have area; at_edges: the T-junctions, whose pairs are left out."""
     a, b, c = (points[faces[solid_faces, k]] for k in range(3))
     at_junctions = _pairs_at(faces, at_edges)
     blocks = [np.zeros((0, 2), np.int64)]
@@ -141,13 +147,15 @@ def crossings(
 
 
 def _common_first(rows: IntArray, is_common: Any) -> IntArray:
-    """Return faces with the corners that they share first, the smallest of these first."""
+    """Return faces (n, 3), each rotated so that corners that are common (is_common (n, 3)) come first, the smallest of
+    them first."""
     order = np.lexsort((rows, ~is_common), axis=1)
     return np.take_along_axis(rows, order, axis=1)
 
 
 def _pairs_at(faces: IntArray, at_edges: IntArray) -> set[tuple[int, int]]:
-    """Return the pairs of a face at the edge of a T-junction and one at its vertex."""
+    """Return the pairs of faces that meet at T-junctions `at_edges` (an edge, a vertex): one at the edge, one at the
+    vertex."""
     at: dict[int, list[int]] = defaultdict(list)
     for number, face in enumerate(polled(faces.tolist() if len(at_edges) else ())):
         for vertex in face:
@@ -164,7 +172,8 @@ def _apart_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
 
 
 def _at_corner_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
-    """Return whether triangles whose first corners are one have another common point; see the head of this file."""
+    """Return (n,) bool: whether triangles t and u (n, 3, 3), whose first corners are equal, have another common point
+    (see the head of this file)."""
     (s, a, b), (_, c, d) = np.moveaxis(t, 1, 0), np.moveaxis(u, 1, 0)
     sides_of_u = [orientations(s, a, b, x) for x in (c, d)]
     sides_of_t = [orientations(s, c, d, x) for x in (a, b)]
@@ -182,7 +191,8 @@ def _at_corner_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
 
 
 def _at_edge_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
-    """Return whether triangles whose first two corners are common are flat on each other."""
+    """Return (n,) bool: whether triangles t and u (n, 3, 3), which share their first two corners, overlap in one
+    plane."""
     meets = np.zeros(len(t), np.bool_)
     some = np.flatnonzero(orientations(t[:, 0], t[:, 1], t[:, 2], u[:, 2]) == 0)
     relations = _in_plane(t[some], u[some], u[some], budget)

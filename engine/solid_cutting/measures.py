@@ -219,7 +219,8 @@ def _measured(
 
 
 def measure(solid: Solid, what: str, budget: Budget, where: Where = ("solid",)) -> tuple[Any, bool]:
-    """Return the volume, area or centroid of a solid, and whether it took integers. what: which of them."""
+    """Return `what` (volume, area or centroid) of a solid, the nearest double, and whether integers decided the
+    rounding."""
     measures = row_of(solid).volumes
     method = getattr(measures, what, None)
     if method is None:
@@ -230,7 +231,8 @@ def measure(solid: Solid, what: str, budget: Budget, where: Where = ("solid",)) 
 
 
 def _of_mesh(solid: Polyhedron, budget: Budget, what: str) -> tuple[Any, bool]:
-    """Return the volume or centroid of a polyhedron: from the kernels' sums where their bound proves the rounding."""
+    """Return the volume or centroid (`what`) of a polyhedron, and whether integers decided: not where the bound on the
+    kernels' sums proves the rounding."""
     looks = shells(solid, budget)
     exponent = exponent_of(solid.vertices)
     points = shifted(solid.vertices, -exponent)
@@ -265,7 +267,8 @@ def _six_volumes(
 
 
 def _summed(sums: FloatArray, n: int, side: int, more: float = 0.0) -> tuple[Fraction, Fraction] | None:
-    """Return the exact value of a sum (high and low part, size of n terms) times side, and a bound on its error."""
+    """Return side times a sum of n terms, given as (high part, low part, sum of sizes), exactly, and a bound on its
+    error, to which `more` is added."""
     h, low, size = sums.tolist()
     bound = bound_of(size, n) + more
     if not isfinite(h + low + bound):
@@ -274,7 +277,7 @@ def _summed(sums: FloatArray, n: int, side: int, more: float = 0.0) -> tuple[Fra
 
 
 def _rounded(value: Fraction, error: Fraction) -> float | None:
-    """Return the double nearest to every number within error of a value, None if there is no such."""
+    """Return the double to which value - error and value + error both round, None if they differ."""
     try:
         low, high = nearest_float(value - error), nearest_float(value + error)
     except NotRepresentableError:

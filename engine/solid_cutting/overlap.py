@@ -215,8 +215,8 @@ def _pairs_of(
 def _of_pair(
     first: Any, second: Any, poses: Sequence[Any], number: int, is_ratio: bool, budget: Budget
 ) -> tuple[float, bool]:
-    """Return the common volume of two solids, or its ratio, and whether it took exact arithmetic. poses: as for
-    `of_bodies`."""
+    """Return the common volume of two solids, or its ratio to that of the union (is_ratio), and whether integers
+    decided."""
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
         first, second, _ = read_pair(first, second, budget.left(), budget.cancel)
     if first.dimension != second.dimension:
@@ -254,7 +254,8 @@ def _of_pair(
 
 
 def _rows_of(solid: Solid, pose: Pose | None, budget: Budget) -> Rows | None:
-    """Return the planes of a convex solid under a pose, exact; None if it is not convex."""
+    """Return the exact planes of a convex solid under a pose, each (normal, offset); None if the solid is not
+    convex."""
     if not isinstance(solid, (Aabb, Convex)) and not (isinstance(solid, Polyhedron) and convexity(solid) is not None):
         return None
     planes = (_as_plane(row) for row in plan_of(solid, budget.check).rows)
@@ -286,7 +287,8 @@ def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
 
 
 def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, budget: Budget) -> float:
-    """Return what a polyhedron has in common with a convex region, whose planes are brought into its coordinates."""
+    """Return the common volume of a polyhedron and a convex region given by `rows`, or its ratio to that of the union;
+    pose: of the polyhedron, into whose coordinates the rows are brought."""
     factor = _determinant(pose)
     own = [plane_in_frame(_as_plane(row), pose) for row in rows]
     left = cut_by_planes(solid, [plane_of(scaled_integers([*normal, offset])) for normal, offset in own], budget)

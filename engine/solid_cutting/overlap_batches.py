@@ -124,7 +124,7 @@ def pose_of(poses: Any, solid: Solid, k: int, number: int) -> Pose | None:
 
 
 def _numbers_of(poses: Any, solid: Solid, k: int, number: int) -> list[float]:
-    """Return the numbers of a pair's pose, and 1.0, or zeros for none."""
+    """Return (13,): rotation by rows, translation, and 1.0, of pose k of a solid; zeros for none."""
     move = pose_of(poses, solid, k, number)
     return [0.0] * 13 if move is None else [*move.rotation.ravel().tolist(), *move.translation.tolist(), 1.0]
 
@@ -224,7 +224,8 @@ def _checked(each: Any, name: str) -> FloatArray:
 
 
 def overlap_of_polygons(first: Solid, second: Solid, moves: tuple[Any, Any], is_ratio: bool, budget: Budget) -> float:
-    """Return what polygons have in common. is_ratio: maybe each axis multiplied by a power of two."""
+    """Return the common area of two polygons, or its ratio to that of their union (is_ratio), as the nearest double.
+    moves: their poses, which must be None."""
     if moves != (None, None):
         raise UnsupportedPairError("polygons take no pose here; move their vertices", ("first_pose",))
     sides = [_as_polygon(each) for each in (first, second)]
@@ -239,8 +240,8 @@ def overlap_of_polygons(first: Solid, second: Solid, moves: tuple[Any, Any], is_
 
 
 def _ratios(pairs: Sequence[tuple[Any, Any]], workers: int | None, budget: Budget) -> FloatArray:
-    """Return the nearest doubles of ratios of areas. pairs: of polygons, and of each with a box around, within which it
-    has its own area."""
+    """Return the nearest doubles of the ratios of common area to area of the union, by pair. pairs: three batches of
+    polygons: the pairs, and each side with boxes around it, whose overlap is the side's own area."""
     limits: Any = {"deadline": budget.left(), "cancel": budget.cancel, "workers": workers}
     made: list[Any] = [overlay_batch(*pair, **limits) for pair in pairs]
     sums, values = np.stack([twice_areas(each) for each in made], axis=1), np.empty(len(made[0]))
@@ -258,19 +259,21 @@ def _ratios(pairs: Sequence[tuple[Any, Any]], workers: int | None, budget: Budge
 
 
 def extremes(low: Sequence[Fraction], high: Sequence[Fraction]) -> Any:
-    """Return (both, first, second) at which their ratio is least, and greatest: 1 where all may be the same."""
+    """Return the volumes (common, first, second) for which the ratio of common to union is least, and those for which
+    it is largest, given bounds `low` and `high` on the three; (1, 1, 1) for the latter if all three may be equal."""
     return (low[0], *high[1:]), (high[0], *low[1:]) if high[0] <= min(low[1:]) else (Fraction(1),) * 3
 
 
 def ratio_of(volumes: Sequence[Fraction]) -> float:
-    """Return the ratio of what two have in common to their union, from that and the volume of each."""
+    """Return common / union, rounded to nearest and clamped to 0 .. 1, from the exact volumes (common, first,
+    second)."""
     both, first, second = volumes
     union = first + second - both
     return min(1.0, max(0.0, nearest_float(both / union))) if union > 0 else 0.0
 
 
 def _selection(corners: FloatArray) -> PolygonSelection:
-    """Return an array (n, k, 2) as polygons."""
+    """Return polygons given as an array (n, k, 2) as a `PolygonSelection`."""
     n, k = corners.shape[:2]
     arrays = arrays_of(corners.reshape(-1, 2), np.arange(0, n * k + 1, k), np.arange(n + 1))
     return PolygonSelection(arrays, np.arange(n))
@@ -290,7 +293,8 @@ def _scaled(*sides: FloatArray) -> list[FloatArray]:
 
 
 def _around(corners: FloatArray) -> FloatArray:
-    """Return a box strictly around each polygon: with that it has its own area in common, crossing no edge."""
+    """Return a box (n, 4, 2) around each polygon of corners (n, k, 2), which no edge of it touches: the overlap of both
+    is the polygon's own area."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     width = (high - low).max(axis=1, keepdims=True) + np.abs(low) + 1e-300
     low, high = np.maximum(low - width, -_MOST), np.minimum(high + width, _MOST)

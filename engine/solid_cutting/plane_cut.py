@@ -84,7 +84,7 @@ class Points:
         return self._rounded[numbers]
 
     def at(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the nearest doubles (n, 3) of points, and the rest."""
+        """Return positions (n, 3) of points as double-doubles: the nearest doubles, and the rest."""
         low, is_new = np.zeros((len(numbers), 3)), numbers >= self.n_given
         low[is_new] = self.low[numbers[is_new] - self.n_given]
         return self.rounded(numbers), low
@@ -133,7 +133,7 @@ class Points:
         return sign_of(value_at(plane, self.exact(number)))
 
     def add(self, edges: IntArray, planes: list[Plane], which: IntArray, budget: Budget) -> None:
-        """Add the points where edges (k, 2) cross their planes, which (k,) of `planes`, the first end inside."""
+        """Add the crossings of edges (k, 2) with planes[which[k]], the first end of each edge being inside."""
         first, n = len(self), len(edges)
         high, low, is_nearest = np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, np.bool_)
         self._plane_of = np.concatenate([self._plane_of, which + len(self._planes)])
@@ -153,8 +153,8 @@ class Points:
         self.high, self.low = np.concatenate([self.high, high]), np.concatenate([self.low, low])
 
     def add_crossings(self, edges: IntArray, on_plane: IntArray, plane: Plane, budget: Budget) -> IntArray:
-        """Add the points where edges (k, 2) cross a plane, the first end inside; return their numbers: of points at one
-        place the first, one of those on the plane if it is there."""
+        """Add the crossings of edges (k, 2) with a plane, the first end inside; return their numbers. Crossings at one
+        place get one number, that of a point of `on_plane` if there is one at that place."""
         first, n = len(self), len(edges)
         self.add(edges, [plane], np.zeros(n, np.int64), budget)
         numbers = np.arange(first, first + n)
@@ -194,8 +194,8 @@ def cut_triangles(
     points: Points, triangles: IntArray, plane: Plane, budget: Budget, sides: Int8Array | None = None,
     with_beyond: bool = False,
 ) -> Cut:  # fmt: skip
-    """Return what is inside a plane of triangles (m, 3), and what is outside if asked for; the points on it are added.
-    sides: by point, if known."""
+    """Return, as a `Cut`, what is inside a plane of triangles (m, 3), and with_beyond also what is outside. Crossings
+    are added to `points`. sides: of all points at the plane, if known."""
     sides = points.sides(plane, budget) if sides is None else sides
     whole, mixed = np.empty(len(triangles), np.int64), np.empty(len(triangles), np.int64)
     counts = entry_of(split_faces)(read_only(triangles), sides, whole, mixed, budget.flag)

@@ -108,7 +108,7 @@ def _shells_of(solid: Polyhedron, budget: Budget) -> Shells:
 
 
 def _numbers_of(parts: list[IntArray], n: int) -> IntArray:
-    """Return the number of the part of each of n faces."""
+    """Return (n,): for each of n faces the number of the part, of `parts`, that it belongs to."""
     numbers = np.empty(n, np.int64)
     for number, part in enumerate(parts):
         numbers[part] = number
@@ -116,12 +116,12 @@ def _numbers_of(parts: list[IntArray], n: int) -> IntArray:
 
 
 def _within(part_of: IntArray, contacts: IntArray) -> IntArray:
-    """Return the contacts of faces of one part."""
+    """Return the rows of contacts (k, 2) whose two faces belong to one part. part_of: by face."""
     return contacts[part_of[contacts[:, 0]] == part_of[contacts[:, 1]]]
 
 
 def _separated(edges: Edges) -> Edges:
-    """Return edges of which those of more than two faces join nothing."""
+    """Return edges as if faces that share one with more than two were not joined there."""
     of, n = edges.of.copy(), len(edges.ends)
     for corner in np.flatnonzero(edges.uses[of.ravel()] != 2).tolist():
         of[corner // 3, corner % 3], n = n, n + 1
@@ -129,7 +129,8 @@ def _separated(edges: Edges) -> Edges:
 
 
 def _are_closed(edges: Edges, part_of: IntArray, faces: IntArray) -> bool:
-    """Return whether the faces of each part use each edge as often in one direction as in the other."""
+    """Return whether each part is closed: its faces use every edge as often in one direction as in the other. part_of:
+    by face."""
     keys = edges.of * (int(part_of.max()) + 1) + part_of[:, None]
     _, numbers = np.unique(keys, return_inverse=True)
     ways = np.sign(np.roll(faces, -1, axis=1) - faces)
@@ -137,7 +138,7 @@ def _are_closed(edges: Edges, part_of: IntArray, faces: IntArray) -> bool:
 
 
 def _neighbours(edges: Edges, part_of: IntArray) -> IntArray:
-    """Return pairs of faces of different parts at each edge of more than two faces."""
+    """Return pairs (k, 2) of faces of different parts that share an edge which more than two faces have."""
     corners = np.flatnonzero(edges.uses[edges.of.ravel()] > 2)
     corners = corners[np.argsort(edges.of.ravel()[corners], kind="stable")]
     of = edges.of.ravel()[corners]
@@ -179,8 +180,8 @@ class _Shell:
 def nesting(
     points: FloatArray, faces: IntArray, parts: list[IntArray], budget: Budget
 ) -> Iterator[tuple[IntArray, bool]]:
-    """Yield the closed ones of shells, which may cross here, each with whether it is turned: its volume should be above
-    0 within an even number of others, and below 0 within an odd one."""
+    """Yield each closed shell among `parts`, and whether it must be turned over: its signed volume should be positive
+    within an even number of other shells, negative within an odd number. Shells may cross here."""
     closed = []
     for shell in (_Shell(points, faces, part) for part in parts):
         budget.check()
@@ -267,9 +268,9 @@ def _matched(points: FloatArray, faces: IntArray, edges: Edges, way: int, budget
 def _matches(
     points: FloatArray, faces: IntArray, ends: IntArray, corners: IntArray, way: int, layers: IntArray
 ) -> list[tuple[int, int]]:
-    """Return pairs of sides at an edge, side k of face i as 3 i + k: neighbours by angle, in opposite directions. way:
-    1 where faces at the same angle that look away from each other lie as if shells were smaller, -1 if larger. Those
-    that look the same way lie as if each were moved to where it looks, the farther the greater its number in layers."""
+    """Return pairs of sides at an edge that several faces share, side k of face i as 3 i + k: neighbours by angle that
+    run in opposite directions. ends: of the edge; corners: the sides; way: for faces at equal angles that look away
+    from each other, 1 if shells count as slightly smaller, -1 if as larger."""
     apexes = faces[corners // 3, (corners + 2) % 3]
     numbers = scaled_integers(points[np.concatenate([ends, apexes])].ravel().tolist())
     a, b, *others = (tuple(numbers[k : k + 3]) for k in range(0, len(numbers), 3))
@@ -296,7 +297,7 @@ def _matches(
 
 
 def matched(ring: list[tuple[int, bool]]) -> list[tuple[int, int]]:
-    """Return pairs of what opens, in a ring, and what closes it, matched as parentheses are."""
+    """Return the pairs (opening, closing) of a cyclic list of (item, whether it opens), matched as parentheses are."""
     waiting: list[int] = []
     pairs: dict[int, int] = {}
     for each, opens in ring + ring:

@@ -34,8 +34,8 @@ _POLL = 0xFFF
 def rank_vertices(
     vertices: FloatArray, normal: FloatArray, heights: FloatArray, ranks: IntArray, is_on: BoolArray, flag: FlagArray
 ) -> bool:
-    """Fill ranks (n,), how many of the heights, ascending, are below normal . vertex, and is_on (n,), whether it is the
-    next one; return whether all were decided."""
+    """Fill ranks (n,) with the number of heights (ascending) below normal . vertex, and is_on (n,) with whether the
+    next height equals it; return whether all were decided."""
     for vertex in range(vertices.shape[0]):
         if vertex & _POLL == 0 and flag[0] != 0:
             return False

@@ -69,7 +69,8 @@ def _minor(vertices: FloatArray, a: int, b: int, c: int, x: int, y: int) -> tupl
 
 @inline
 def _sum_of_three(vertices: FloatArray, a: int, b: int, c: int, x: int, origin: float) -> tuple[float, float, float]:
-    """Return (h, l, size): the sum of three coordinates relative to the origin, and of their sizes."""
+    """Return (h, l, size): the sum of coordinate x of vertices a, b, c, each relative to `origin`, as a double-double,
+    and the sum of their magnitudes."""
     ah, al = two_diff(vertices[a, x], origin)
     bh, bl = two_diff(vertices[b, x], origin)
     ch, cl = two_diff(vertices[c, x], origin)
@@ -97,7 +98,8 @@ def _sum_of_squares(
 
 @inline
 def _add(sums: FloatArray, k: int, h: float, low: float, size: float) -> None:
-    """Add a term to row k of sums (4, 3): high part, low part, size."""
+    """Add a term h + low to row k of sums (4, 3), a double-double and the sum of magnitudes, to which `size` is
+    added."""
     sums[k, 0], lost = two_sum(sums[k, 0], h)
     sums[k, 1] += lost + low
     sums[k, 2] += size
@@ -183,5 +185,5 @@ def sum_area(vertices: FloatArray, triangles: IntArray, sums: FloatArray, flag: 
 
 
 def bound_of(size: float, n: int) -> float:
-    """Return the error bound of a sum of n terms; size: the sum of their sizes."""
+    """Return a bound on the error of a sum of n terms in double-double; size: the sum of their magnitudes."""
     return 1.001 * ((192.0 + 4.0 * float(n) ** 2) * U2 * size + n * _TINY)

@@ -256,7 +256,7 @@ def test_the_audit_needs_no_checkout(full: Path, tmp_path: Path) -> None:
     (environment.home / "square.geojson").write_text(square)
     words = ["-m", "engine", "audit", "square.geojson", "--seconds", "0.01", "-o", "page.html"]
     output, _ = environment.run(*words)
-    assert "textbook: half-line, float32" in output
+    assert "textbook: ray casting, float32" in output
     assert (environment.home / "page.html").stat().st_size > 10_000
 
 
