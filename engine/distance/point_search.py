@@ -230,8 +230,10 @@ def _rounded(distance: Wide, error: float, unit: float) -> float:
 
 @called
 def _refine(view: View, q: Point3, n: int, candidates: Candidates) -> tuple[Wide, float, int]:
-    """Return the distance of a point from the first n candidates, which is not 0, a bound on its error, and n less
-    those that are farther."""
+    """Return (distance, error, left): the distance of point q from the nearest of the first n candidates, in
+    double-doubles and times `view.unit`, a bound on its error, and the number of candidates left. Those that are
+    certainly farther are removed, the others moved to the front with new lower bounds. Caller guarantees that the
+    distance is not 0."""
     none = Wide(0.0, 0.0)
     origin = Wide3(none, none, none)
     least, lowest, spot = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Facet(origin, origin, origin)

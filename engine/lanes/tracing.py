@@ -185,8 +185,9 @@ def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 class _Traced(_Intrinsic):  # type: ignore[misc]
-    """A function that Numba compiles by calling it: in compiled callers it, or `emit` if given, generates code from
-    stand-ins; in Python it runs as it is."""
+    """A function that Numba compiles by tracing: while a caller is compiled, it (or `emit` if given) is called once
+    with stand-ins (`Emitted`) for its arguments, whose operators append LLVM instructions to the caller's code. Called
+    from Python with numpy arrays, it runs as it is."""
 
     def __init__(self, function: Callable[..., Any], emit: Callable[..., Any] | None = None) -> None:
         signature = inspect.signature(function)

@@ -343,8 +343,9 @@ def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_rin
 
 @merged
 def emit(s: Scratch, ring: Int32Array, n: int, n_ring: int, out: FloatArray, place: int) -> int:
-    """Write the vertices of the n runs of a ring to the flat array `out` from index `place` on; return the index after
-    them. Vertices below n_ring are original ones, at which runs begin; others stand for themselves."""
+    """Write the coordinates of a ring of n vertices to the flat array `out` from index `place` on; return the index
+    after them. ring: numbers of vertices; an original one (below n_ring) stands for its run, v .. ``s.ends[v]``, others
+    were made by cuts."""
     d = len(s.vertices.names)
     for i in range(n):
         v = ring[i]

@@ -204,7 +204,9 @@ def _exact_start(
 
 
 def _merged(parts: list[Hits], bodies: list[IntArray], starts: dict[int, Any], keep: int) -> SceneHits:
-    """Return the hits on all bodies in order; parameters that round alike are compared exactly."""
+    """Return the hits on all bodies, by source, then t, then body; with keep FIRST only the first of each source.
+    parts, bodies: for each body that was searched its hits, and its number once for each of them. starts: by body a
+    function (source, triangle, t) that gives the exact parameter of a hit, called where parameters round alike."""
     if not parts:
         none, three, whole = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
         return SceneHits(whole, whole, none, none, whole, whole, np.zeros(0, np.int8), three, three)

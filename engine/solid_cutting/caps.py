@@ -269,7 +269,8 @@ def _fan_of(view: Seen, ring: Ring) -> IntArray:
 
 
 class _TurnedError(Exception):
-    """A triangle is turned: what floats proposed is not right."""
+    """Floats could not triangulate a polygon: a triangle is clockwise by exact signs, or ears ran out. The caller tries
+    again with sides split at contacts, then with fractions."""
 
 
 def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntArray:

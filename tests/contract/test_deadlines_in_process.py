@@ -132,8 +132,11 @@ def wrinkled() -> tuple[Any, Any]:
 
 
 def vast() -> Any:
-    """Return a ball that is not convex, with nothing prepared."""
-    return engine.Polyhedron(*wrinkled())
+    """Return two balls that are not convex, with nothing prepared: no point sees all of their faces."""
+    vertices, faces = wrinkled()
+    return engine.Polyhedron(
+        np.concatenate([vertices, vertices + [4, 0, 0]]), np.concatenate([faces, faces + len(vertices)])
+    )
 
 
 @cache

@@ -156,9 +156,11 @@ def propagate_labels(
     given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: FloodFill, selected: FlagArray,
     sizes: tuple[int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill ``faces.inside`` (by cycle the part of the result, 0 outside) by flood fill over half-chains, and append
-    evidence entries to ``h``; return their number, or NO_ROOM. selected: by label the part, for the rule PAIR. sizes:
-    numbers of chains and cycles. ``faces.joined`` is filled: it unites the cycles of one face."""
+    """Fill ``faces.inside`` (by cycle the part of the result, 0 outside) by flood fill from the unbounded face over
+    half-chains. By rule AGAIN also append to ``h`` the evidence, pairs of a source ring and a face that it puts inside
+    or outside; return their number, or NO_ROOM. selected: for the rule PAIR the part by label (bit 0: in the subject,
+    bit 1: in the clip). sizes: numbers of chains and cycles. ``faces.joined``, filled before, unites the cycles of one
+    face."""
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
     for ring in range(nesting.shells.shape[0]):
