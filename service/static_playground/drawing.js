@@ -66,6 +66,26 @@ export function prepared3d(items, frame, colors) {
   }));
 }
 
+const bounds = (all) => [Math.min, Math.max].map((f) => all[0].map((_, k) => all.reduce((m, p) => f(m, p[k]), all[0][k])));
+
+// The ball about bodies that were prepared, and about the rings that turn one of them.
+export function ballAround(items, rings) {
+  const all = items.filter(({ kind }) => kind === "triangles").flatMap(({ positions, pose }) => Array.from({ length: positions.length / 3 }, (_, i) => {
+    const p = [...positions.subarray(3 * i, 3 * i + 3)];
+    return pose ? times(pose.rotation, p).map((v, k) => v + pose.translation[k]) : p;
+  }));
+  if (rings) for (const k of [0, 1, 2]) for (const sign of [-1, 1]) all.push(rings.middle.map((v, j) => (j === k ? v + sign * rings.radius : v)));
+  const [low, high] = bounds(all), middle = low.map((v, k) => (v + high[k]) / 2);
+  const reach = rings ? Math.hypot(...rings.middle.map((v, k) => v - middle[k])) + rings.radius : 0;
+  return { middle, radius: all.reduce((far, p) => Math.max(far, Math.hypot(...p.map((v, k) => v - middle[k]))), reach) };
+}
+
+// How far rings and discs of the plane reach from the origin along each axis, with a margin.
+export function halfAround(items, least) {
+  const all = items.flatMap(({ rings, center, radius }) => rings?.flat() ?? (center ? [-1, 1].map((sign) => center.map((v) => v + sign * radius)) : []));
+  return [0, 1].map((k) => all.reduce((far, p) => Math.max(far, Math.abs(p[k]) / 1.1), least));
+}
+
 export function prepared2d(items, colors) {
   return items.map((item) => ({ ...item, color: `rgb(${colors[item.color].join(" ")} / ${item.alpha ?? 1})` }));
 }

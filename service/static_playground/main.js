@@ -1,7 +1,7 @@
 // The page: reads the controls, asks the service, shows the answer. One request is under way at a time; while it is, only
 // the newest state waits.
 
-import { prepared2d, prepared3d, styleColors } from "./drawing.js";
+import { ballAround, halfAround, prepared2d, prepared3d, styleColors } from "./drawing.js";
 import { UNIT, frameOf, framed, fromView, placed, toView, turned } from "./frame.js";
 import { example, readRequest } from "./given.js";
 import { Lens, boundaryNear, lattice } from "./lens.js";
@@ -222,7 +222,7 @@ async function once() {
   readControls();
   const now = { ...state, offset: [...state.offset] }, question = QUESTIONS[now.question];
   for (const solid of [now.first, now.second]) if (solid) await store(solid);
-  if (now.first && !isDrawn) showPicture(now, firstItems(now)); // the answer takes a while where kernels are compiled
+  if (now.first && !isDrawn) showPicture(now, firstItems(now), false); // the answer takes a while where kernels are compiled
   isDrawn = true;
   const { path, body, items } = question.ask(now), text = JSON.stringify(body);
   showRequest(path, text);
@@ -238,7 +238,7 @@ async function once() {
   const figures = { ...question.figures(now, answer, other), ...also?.figures };
   showFigures(figures, answer.accuracy, timing, seconds, items);
   showPicture(now, [...question.draw(now, answer, body, other), ...(also?.items ?? [])]);
-  showLabels(question.labels?.(answer, other) ?? []);
+  showLabels(question.labels?.(answer, other, figures) ?? []);
   await look(now, body, next?.body, other?.differing ?? [], question.verdict(now, answer, figures, other));
   fillText();
   saveState();
@@ -248,6 +248,7 @@ async function once() {
 async function look(now, body, compared, differing, words) {
   $("to-lens").hidden = !differing.length || now.lens !== null;
   const isOpen = now.lens !== null && differing.length > 0;
+  $("stage").classList.toggle("headed", Boolean(QUESTIONS[now.question].labels) && !isOpen); // the headings say what the verdict does
   for (const id of ["lens", "lens-bar"]) $(id).hidden = !isOpen;
   $("view3d").hidden = now.dimension !== 3 || isOpen;
   $("view2d").hidden = now.dimension !== 2 || isOpen;
@@ -304,16 +305,29 @@ let shown = {};
 
 const cssColors = () => Object.fromEntries(Object.entries(styleColors()).map(([name, rgb]) => [name, `rgb(${rgb.join(" ")})`]));
 
-function showPicture(now, drawn) {
-  const colors = styleColors(), count = QUESTIONS[now.question].panes ?? 1;
+let fitted = {}; // to which question and solids the views are fitted: they stay so while bodies are moved and turned
+
+function showPicture(now, drawn, isWhole = true) {
+  const colors = styleColors(), count = QUESTIONS[now.question].panes ?? 1, least = count > 1 ? 1.3 : 2.1;
+  const fit = { question: now.question, dimension: now.dimension, first: now.first?.base ?? now.first, second: now.second?.base ?? now.second, frame: now.frame };
+  const isNew = !isWhole || Object.keys(fit).some((key) => fit[key] !== fitted[key]);
+  if (isWhole) fitted = fit;
   if (now.dimension === 2) {
     const rings = editable(now), edges = rings.flatMap(({ at }) => at.map((p, i) => [p, at[(i + 1) % at.length]]));
-    views.plane.show(prepared2d(framed(drawn, now.frame), colors), { corners: rings.flatMap(({ at }) => at), edges, count, grid: now.snap ? 0.25 : 0 });
+    const items = prepared2d(framed(drawn, now.frame), colors), half = isNew ? halfAround(items, least) : undefined;
+    views.plane.show(items, { corners: rings.flatMap(({ at }) => at), edges, count, half, grid: now.snap ? 0.25 : 0 });
   } else if (views.space) {
     const { turns, middle } = QUESTIONS[now.question], canTurn = turns || now.question === "collide";
-    views.space.show(prepared3d(drawn, now.frame, colors), { count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null });
+    const items = prepared3d(drawn, now.frame, colors), rings = canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null;
+    views.space.show(items, { count, rings, ball: isNew ? fittedBall(items, rings, now) : undefined });
     if (now.question === "proof" && !past.past.length) views.space.spin();
   }
+}
+
+// Around the bodies; where points, rays or segments are asked about, with room for them.
+function fittedBall(items, rings, now) {
+  const ball = ballAround(items, rings);
+  return QUESTIONS[now.question].counts && now.question !== "proof" ? { ...ball, radius: Math.max(ball.radius, 1.9) } : ball;
 }
 
 function showLabels(labels) {

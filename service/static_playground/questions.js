@@ -310,7 +310,7 @@ export const QUESTIONS = {
   },
 
   cut: {
-    hint: "What a plane leaves of the body on the side of its normal, closed: blue, its cap green. Beside it the section. Move the plane, turn it; snapped to quarters it passes through corners and along faces.",
+    hint: "What a plane leaves of the body on the side of its normal, closed: grey, its cap green; next to it the section. Move the plane, turn it; snapped to quarters it passes through corners and along faces.",
     dimensions: [3],
     firsts: (solid) => solid.mesh && !solid.crosses,
     preferred: { 3: "knot" },
@@ -333,7 +333,8 @@ export const QUESTIONS = {
       },
       draw: ({ sections: [{ pieces }] }) => outlines(pieces.flatMap(({ shell, holes }) => [shell, ...holes]), "kept", 2.5).map((item) => ({ ...item, pane: 1 })),
     }),
-    verdict: (state, answer, figures) => `section ${figures["area of the section"]?.toPrecision(6) ?? "refused"}, volume inside ${figures["volume inside"].toPrecision(6)}`,
+    labels: (answer, other, figures) => [`what remains, volume ${figures["volume inside"].toPrecision(6)}`, `section, area ${figures["area of the section"]?.toPrecision(6) ?? "refused"}`],
+    verdict: (state, answer, figures) => `section ${figures["area of the section"]?.toPrecision(6) ?? "refused"}, volume ${figures["volume inside"].toPrecision(6)}`,
     draw(state, { parts: [{ vertices, faces, origins }] }) {
       const part = (isCap) => ({ kind: "triangles", mesh: { vertices, faces: faces.filter((face, i) => origins[i] < 0 === isCap) } });
       return [...solid3d(state.first, "outside", 0.1).map((item) => ({ ...item, pane: 0 })), { ...part(false), color: "first", alpha: 0.6, pane: 0 }, { ...part(true), color: "kept", alpha: 0.7 }];

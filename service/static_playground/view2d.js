@@ -5,10 +5,14 @@ const GRIP = 14; // pixels within which a corner or an edge is taken
 
 export const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-// The rectangles of n pictures on a canvas, beside each other or, where it is high, one below the other.
+const HEADING = 36; // pixels above each of several pictures
+
+// The rectangles of n pictures on a canvas, next to each other or, where it is high, one below the other, each below its heading.
 export function panes({ clientWidth: width, clientHeight: height }, n) {
-  const isWide = width >= height;
-  return Array.from({ length: n }, (_, i) => (isWide ? { left: (i * width) / n, top: 0, width: width / n, height } : { left: 0, top: (i * height) / n, width, height: height / n }));
+  const [across, down] = width >= height ? [n, 1] : [1, n], heading = n > 1 ? HEADING : 0;
+  return Array.from({ length: n }, (_, i) => ({
+    left: across > 1 ? (i * width) / n : 0, top: (down > 1 ? (i * height) / n : 0) + heading, width: width / across, height: Math.max(1, height / down - heading),
+  }));
 }
 
 // Positions of the pointers that are down, how they moved together, and how they spread.
@@ -32,7 +36,7 @@ export class Fingers {
 export class View2D {
   constructor(canvas, { onMove, onCorner, onCornerEnd, onAdd, onDelete, onView }) {
     this.canvas = canvas; this.context = canvas.getContext("2d"); this.onView = onView;
-    Object.assign(this, { items: [], corners: [], edges: [], radius: 2.1, middle: [0, 0], zoom: 1, panes: 1, grid: 0 });
+    Object.assign(this, { items: [], corners: [], edges: [], half: [2.1, 2.1], middle: [0, 0], zoom: 1, panes: 1, grid: 0 });
     const fingers = new Fingers(canvas);
     let held = -1, last = null;
     canvas.addEventListener("pointerdown", (event) => { last = this.at(event); held = this.cornerAt(last); });
@@ -61,7 +65,7 @@ export class View2D {
     canvas.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
       if (step && event.shiftKey) this.pan(-12 * step[0], 12 * step[1]);
-      else if (step) onMove([...step.map((v) => (v * this.radius) / 40 / this.zoom), 0]);
+      else if (step) onMove([...step.map((v) => (v * this.half[1]) / 40 / this.zoom), 0]);
       else if (event.key === "+" || event.key === "=") this.zoomAt(1.1, this.middle);
       else if (event.key === "-") this.zoomAt(1 / 1.1, this.middle);
       else return;
@@ -72,7 +76,7 @@ export class View2D {
 
   scale() {
     const { width, height } = panes(this.canvas, this.panes)[0];
-    return (Math.min(width, height) * this.zoom) / (2.3 * this.radius);
+    return (Math.min(width / this.half[0], height / this.half[1]) * this.zoom) / 2.3;
   }
 
   at(event) {
@@ -96,8 +100,8 @@ export class View2D {
   look(middle, zoom) { Object.assign(this, { middle, zoom }); this.draw(); this.onView(); }
 
   // items: {kind: "rings" | "disc" | "half_plane" | "lines" | "points" | "crosses", ..., color: css, fill?: alpha, width?, pane?};
-  // corners and edges that can be taken; the step of the grid that is shown, 0 for none
-  show(items, { corners = [], edges = [], count = 1, grid = 0 }) { Object.assign(this, { items, corners, edges, panes: count, grid }); this.draw(); }
+  // corners and edges that can be taken; the step of the grid that is shown, 0 for none; half the extents to be seen, from the origin
+  show(items, { corners = [], edges = [], count = 1, grid = 0, half = this.half }) { Object.assign(this, { items, corners, edges, panes: count, grid, half }); this.draw(); }
 
   draw() {
     const { canvas, context } = this, ratio = window.devicePixelRatio || 1;

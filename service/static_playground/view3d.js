@@ -30,6 +30,7 @@ void main() { gl_Position = camera * vec4(position, 1.0); gl_PointSize = width; 
 precision highp float; uniform vec4 color; out vec4 shade;
 void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard; shade = vec4(color.rgb, 1.0) * color.a; }`];
 
+const HALF_ANGLE = 0.35; // of the view, along the shorter side of a pane
 const GRIP = 10; // pixels within which a ring is taken
 const LATE = 40; // milliseconds from asking for a frame to drawing it: three such in turn, and the machine is slow
 const CIRCLE = Array.from({ length: 65 }, (_, i) => [Math.cos((Math.PI * i) / 32), Math.sin((Math.PI * i) / 32)]);
@@ -39,7 +40,7 @@ export class View3D {
   constructor(canvas, { onMove, onTurn, onTurnEnd }) {
     this.canvas = canvas;
     this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false });
-    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, radius: 2.1, items: [], panes: 1, rings: null, buffers: new Map(), back: backOf(canvas), late: 0 });
+    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, ball: { middle: [0, 0, 0], radius: 2.1 }, items: [], panes: 1, rings: null, buffers: new Map(), back: backOf(canvas), late: 0 });
     if (!this.gl) throw new Error("this browser has no WebGL 2; the 2D pictures work without it");
     [this.mesh, this.lines, this.points] = [MESH, LINES, POINTS].map((source) => program(this.gl, ...source));
     const fingers = new Fingers(canvas);
@@ -95,12 +96,12 @@ export class View3D {
   }
 
   move(dx, dy, onMove) {
-    const [right, up] = this.axes(), scale = (2 * this.distance() * Math.tan(0.35)) / panes(this.canvas, this.panes)[0].height;
+    const [right, up] = this.axes(), scale = (2 * this.distance() * Math.tan(HALF_ANGLE)) / panes(this.canvas, this.panes)[0].height;
     onMove(right.map((r, k) => (r * dx - up[k] * dy) * scale));
   }
 
   zoomBy(factor) { this.zoom = Math.max(0.1, Math.min(20, this.zoom * factor)); this.draw(); }
-  distance() { return (this.radius * 2.7) / this.zoom; }
+  distance() { return (1.03 * this.ball.radius) / Math.sin(HALF_ANGLE) / this.zoom; } // the ball touches the edges but for 3%
 
   axes() {
     const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
@@ -109,10 +110,11 @@ export class View3D {
 
   camera(aspect) {
     const [right, up, back] = this.axes();
-    const distance = this.distance(), near = distance / 50, far = distance + 20 * this.radius;
-    const f = 1 / Math.tan(0.35), zoom = Math.min(1, aspect) * f, depth = (near + far) / (near - far);
+    const distance = this.distance(), near = distance / 50, far = distance + 20 * this.ball.radius;
+    const f = 1 / Math.tan(HALF_ANGLE), zoom = Math.min(1, aspect) * f, depth = (near + far) / (near - far);
     const rows = [right.map((v) => (v * zoom) / aspect), up.map((v) => v * zoom), back.map((v) => v * depth), back.map((v) => -v)];
-    const last = [0, 0, -distance * depth + (2 * near * far) / (near - far), distance];
+    const behind = [0, 0, -distance * depth + (2 * near * far) / (near - far), distance];
+    const last = rows.map((row, i) => behind[i] - row.reduce((sum, v, k) => sum + v * this.ball.middle[k], 0));
     return new Float32Array([0, 1, 2].flatMap((k) => rows.map((row) => row[k])).concat(last));
   }
 
@@ -138,14 +140,14 @@ export class View3D {
   }
 
   // items: {kind: "triangles" | "lines" | "points", positions: Float32Array, color: [r, g, b, a], width?, onTop?, pose?, pane?};
-  // rings: {middle, radius} of the body that can be turned by them
-  show(items, { count = 1, rings = null, radius = 2.1 }) {
+  // rings: {middle, radius} of the body that can be turned by them; ball: {middle, radius} of what is to be seen
+  show(items, { count = 1, rings = null, ball = this.ball }) {
     const used = new Set(items.flatMap(({ positions, indices }) => [positions, indices]));
     for (const [array, buffer] of this.buffers) if (!used.has(array)) { this.gl.deleteBuffer(buffer); this.buffers.delete(array); }
     const circles = rings ? ringsAround(rings).map((ring, k) => ({
-      kind: "lines", positions: new Float32Array(ring.slice(1).flatMap((p, i) => [...ring[i], ...p])), color: [0, 1, 2].map((j) => (j === k ? 0.85 : 0.3)).concat(0.9), width: 2,
+      kind: "lines", positions: new Float32Array(ring.slice(1).flatMap((p, i) => [...ring[i], ...p])), color: [0, 1, 2].map((j) => (j === k ? 0.85 : 0.3)).concat(0.9), width: 2, pane: 0,
     })) : [];
-    Object.assign(this, { items: [...items, ...circles], panes: count, rings, radius, back: backOf(this.canvas) });
+    Object.assign(this, { items: [...items, ...circles], panes: count, rings, ball, back: backOf(this.canvas) });
     this.draw();
   }
 

@@ -294,6 +294,24 @@ def test_a_mesh_file_is_opened_and_asked(page: Any, tmp_path: Path) -> None:
         page.screenshot(path=f"{folder}/mesh.png")
 
 
+@pytest.mark.parametrize("size", [(390, 844), (1280, 800)])
+def test_bodies_are_drawn_whole(page: Any, size: tuple[int, int]) -> None:
+    """Along the edges of the picture, and under the headings of two panes, there is only the colour of the stage."""
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.emulate_media(reduced_motion="reduce")
+    for question in ("proof", "collide", "scene", "cut"):
+        choose(page, question, 3)
+        page.click("#centre")
+        choose(page, question, 3)
+        picture = np.asarray(Image.open(io.BytesIO(page.locator("#view3d").screenshot())).convert("RGB"))
+        picture = picture[3:-3, 3:-3]  # without the border, which a pixel of the screen may share
+        stage = picture[-1, -1]
+        for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
+            assert (edge == stage).all(), question
+    page.emulate_media(reduced_motion="no-preference")
+    page.set_viewport_size({"width": 1200, "height": 820})
+
+
 def test_a_phone_shows_picture_above_panel(page: Any) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     choose(page, "collide", 3)
