@@ -90,7 +90,7 @@ def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUE
         names = {"title": title, "id": title.lower().translate({ord(c): "-" for c in " ,?"}).strip("-")}
         keyed = {side: key if part else None for side, key, part in zip(("easy", "hard"), keys, parts)}
         near = next((row["near"] for row in parts[1] if row.get("near") is not None), None)
-        say = _said(*parts) if titles is QUESTIONS else _said(*parts).replace("Hard input", "Your input")
+        say = _said(*parts) if titles is QUESTIONS else who_is_wrong(parts[1] or parts[0])
         made = {"sides": sides, "seen": seen, "is_alone": is_alone, "say": say, "near": near}
         made["is_more"] = number >= N_FIRST
         result.append(names | keyed | made)
@@ -157,6 +157,29 @@ def _said(easy: list[Row], hard: list[Row]) -> str:
     return " ".join(words) or f"{OURS} alone."
 
 
+def who_is_wrong(rows: list[Row]) -> str:
+    """Say of an audit who is wrong: ours, the fastest peer, and the fastest that is never wrong, with their speeds."""
+    ours, others = _ours(rows), _peers(rows) or _peers(rows, is_book=True)
+    if ours is None:
+        return f"{OURS} alone."
+    kind = re.match(r"your (points|segments)", rows[0].get("about", ""))
+    noun = kind[1] if kind else "answers"
+    near, judged = rows[0].get("near"), ours["errors"]["judged"]
+    half = "" if near is None else ", half of them almost on the boundary"
+    words = [f"{OURS}: {failing(ours):,} wrong of {judged:,} {noun}{half}."]
+    right = next((row for row in others if not failing(row)), None)
+    for row in others[:1] + ([right] if right is not None and right is not others[0] else []):
+        how, pace = (
+            tone(row["rate"] / ours["rate"]),
+            number(max(row["rate"] / ours["rate"], ours["rate"] / row["rate"])),
+        )
+        speed = "about as fast" if how == "same" else f"{pace} times {'as fast' if how == 'faster' else 'slower'}"
+        faulty = [f"{percent(row['errors'].get(kind, 0) / max(1, row['errors']['judged']))} {word}"
+                  for kind, word in zip(BAD, ("wrong", "without an answer", "unsupported")) if row["errors"].get(kind)]  # fmt: skip
+        words.append(f"{short(row)}: {speed}, {' and '.join(faulty) or 'never wrong here'}.")
+    return " ".join(words)
+
+
 def _beside(how: str, ours: Row, others: list[Row]) -> list[str]:
     """Say how ours compares with the fastest, and where that one fails with the fastest that does not."""
     if not others:
@@ -183,13 +206,12 @@ def summary(queried: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, s
     for side in ("easy", "hard"):
         contained = [each["sides"][side] for each in queried if not each["is_alone"] and each["sides"][side]["ratio"]]
         slow = [each for each in contained if tone(each["ratio"]) == "slower"]
-        words = f"questions on {side} input: faster than the fastest peer, or within 10% of it"
-        brief = f"{side} inputs: not slower than any peer"
+        words = f"questions on {side} input: faster than any peer, or within 10%"
+        brief = f"{side} inputs: " + ("not slower than any peer" if side == "easy" else "likewise")
         failed = [each["fails"] for each in slow if each["fails"]]
         if failed:
-            words += f"; {len(failed)} of the {len(slow)} faster peers fail, in {percent(min(failed))} to "
-            words += percent(max(failed))
-            brief += f"; {len(failed)} of {len(slow)} faster ones fail"
+            words += f"; {len(failed)} of the {len(slow)} peers that are faster give wrong or no answers"
+            brief += f"; {len(failed)} of the {len(slow)} faster give wrong or no answers"
         if contained:
             facts.append(
                 (f"{len(contained) - len(slow)} of {len(contained)}", "good" if not slow else "", words, brief)
