@@ -174,8 +174,11 @@ def who_is_wrong(rows: list[Row]) -> str:
             number(max(row["rate"] / ours["rate"], ours["rate"] / row["rate"])),
         )
         speed = "about as fast" if how == "same" else f"{pace} times {'as fast' if how == 'faster' else 'slower'}"
-        faulty = [f"{percent(row['errors'].get(kind, 0) / max(1, row['errors']['judged']))} {word}"
-                  for kind, word in zip(BAD, ("wrong", "without an answer", "unsupported")) if row["errors"].get(kind)]  # fmt: skip
+        total = max(1, row["errors"]["judged"])
+        shares = [
+            (row["errors"].get(kind, 0) / total, word) for kind, word in zip(BAD, ("wrong", "silent", "unsupported"))
+        ]
+        faulty = [f"{percent(share)} {word}" for share, word in shares if share]
         words.append(f"{short(row)}: {speed}, {' and '.join(faulty) or 'never wrong here'}.")
     return " ".join(words)
 

@@ -209,6 +209,10 @@ def test_the_pages_as_committed(browser: Any, name: str, width: int, scheme: str
         assert page.evaluate("document.documentElement.scrollWidth") <= width
     if name == "museum":
         n_failed = page.locator("article").count()
+        assert page.locator("nav").bounding_box()["height"] < 60 or width > 600  # one row, that scrolls sideways
+        cases = page.evaluate("data.cases.map(one => one.today)")
+        wrong = sum(any(name != "textbook" and said == "wrong" for name, said, *_ in today) for today in cases)
+        assert f"today, {wrong} of them by a library" in page.inner_text("#head")
         page.locator("nav button", has_text="all").first.click()
         assert page.locator("article").count() >= 120 > n_failed > 0
         assert page.locator("article svg").count() == page.locator("article").count()
