@@ -135,7 +135,7 @@ def vast() -> Any:
     """Return two balls that are not convex, with nothing prepared: no point sees all of their faces."""
     vertices, faces = wrinkled()
     return engine.Polyhedron(
-        np.concatenate([vertices, vertices + [4, 0, 0]]), np.concatenate([faces, faces + len(vertices)])
+        np.concatenate([vertices, vertices + np.array([4.0, 0.0, 0.0])]), np.concatenate([faces, faces + len(vertices)])
     )
 
 
