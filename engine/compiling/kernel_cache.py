@@ -55,6 +55,7 @@ _REFERENCE = 0.0037
 """Seconds that compiling this file to bytecode took on the machine of `_SECONDS`."""
 _PACKED = b"\xfd7zXZ\x00"
 """The first bytes of an xz file; machine code, pickled, never begins so."""
+_LARGEST = 1 << 26  # bytes of a kernel, unpacked; the largest has 0.5 MB
 _LARGEST_SEED = 1 << 28  # bytes, unpacked; all kernels for one CPU are 5 MB
 
 
@@ -159,7 +160,14 @@ def _unpacked(content: bytes) -> bytes:
         import lzma
     except ImportError as error:  # Python was built without
         raise ValueError(f"it is packed: {error}") from error
-    return lzma.decompress(content)
+    packed = lzma.LZMADecompressor()
+    try:
+        unpacked = packed.decompress(content, _LARGEST)
+    except lzma.LZMAError as error:
+        raise ValueError(f"it is damaged: {error}") from error
+    if not packed.eof:
+        raise ValueError("it is cut off, or too large")
+    return unpacked
 
 
 def _seal_of(name: str, content: bytes) -> bytes:
@@ -251,8 +259,11 @@ def seal(folder: Path, archive: Path | None = None) -> None:
     import lzma
 
     for file in folder.glob("*/*.nbc"):
-        name, content = file.relative_to(folder).as_posix(), file.read_bytes()[32:]
-        if not content.startswith(_PACKED):
+        name, written = file.relative_to(folder).as_posix(), file.read_bytes()
+        content = written[32:]
+        if _seal_of(name, content) != written[:32]:
+            file.unlink()  # it is damaged
+        elif not content.startswith(_PACKED):
             packed = lzma.compress(content, check=lzma.CHECK_NONE)
             file.write_bytes(_seal_of(name, packed) + packed)
     (folder / _MADE_BY).touch(mode=0o644)

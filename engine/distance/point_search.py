@@ -160,7 +160,9 @@ def next_child(tree: Any, room: PointRoom, level: int, limit: float) -> tuple[in
             continue
         rest = int(nodes[level - 1, 1]) & ~(1 << lane)
         nodes[level - 1, 1], nodes[level - 1, 2] = rest, nearest_of(room.bounds, level - 1, rest)
-        return int(tree.child[nodes[level - 1, 0], lane]), level
+        child = int(tree.child[nodes[level - 1, 0], lane])
+        if child != EMPTY:  # case: a point so far away that it has no direction, and bounds are -infinity
+            return child, level
     return -1, 0
 
 

@@ -180,7 +180,7 @@ def _dissolve_lines(
             owners += [group] * len(joined)
     of_lines, offsets = np.array(owners, np.int64), summed([*map(len, lines)])
     vertices = np.array([place for line in polled(lines) for place in line]).reshape(-1, 2)
-    if AREA not in layer.kinds:
+    if AREA not in layer.kinds or not lines:
         return of_lines, vertices, offsets
     n = len(lines)
     paths = Paths(np.full(n, LINE, np.int8), read_only(vertices), offsets, np.arange(n + 1))

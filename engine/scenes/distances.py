@@ -86,7 +86,9 @@ class _Rows:
     def prepare(self, body: int) -> None:
         """Fill the row of a body; threads may do so at the same time, with the same numbers."""
         solid, pose = self._solids[body], self._poses[body]
-        measure: Any = measure_of(solid, None if pose is None or pose.is_identity else pose)
+        if (measure := self.measures.get(body)) is None:  # of threads that make one each, all take the first
+            made: Any = measure_of(solid, None if pose is None or pose.is_identity else pose)
+            measure = self.measures.setdefault(body, made)
         kind, columns = BodyKind.OTHER, (0,) * (N_COLUMNS - 1)
         if isinstance(measure, TriangleMeasure):
             names, kind = measure.names(), BodyKind.MESH
@@ -94,7 +96,6 @@ class _Rows:
             columns = *measure.row, has_inside(solid), *of_names
         elif isinstance(measure, BallMeasure) and measure.numbers is not None:
             kind, columns = BodyKind.BALL, (measure.numbers.ctypes.data, *columns[1:])
-        measure = self.measures.setdefault(body, measure)
         if self.rows[body, KIND] == BodyKind.UNREADY:
             self.rows[body, 1:] = columns
             self.rows[body, KIND] = kind  # order: last, kernels of other threads read it

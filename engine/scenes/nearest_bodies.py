@@ -2,8 +2,8 @@
 where its turn comes; compiled.
 
 Boxes are rounded outward, so they bound distances from below: in tree coordinates by `lanes/points.py`, then in
-doubles, six roundings below `_BELOW`. For a point far from all bodies, where the tree tells little, every box is
-compared with the farthest point of the nearest one.
+doubles: two times `hypot`, some units in the last place below `_BELOW`. For a point far from all bodies, where the tree
+tells little, every box is compared with the farthest point of the nearest one.
 
 A body whose distance is left open, or of a kind that no kernel measures, is noted for the Python beside it
 (`distances.py`), and so is one with an inside whose box has the point.
@@ -14,6 +14,7 @@ Source: N. Roussopoulos, S. Kelley, F. Vincent, Nearest neighbor queries, 1995.
 from __future__ import annotations
 
 from collections import namedtuple
+from math import hypot
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -31,7 +32,6 @@ from engine.distance.point_search import (
     spot_of,
 )
 from engine.distance.traversal import FULL
-from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import array_at
 from engine.scenes.near_boxes import N_BODIES, BodyTree, has_moved, name_in, tree_in
 from engine.solids.registry import BodyKind
@@ -45,6 +45,11 @@ DONE, NO_ROOM, UNREADY, NO_CANDIDATES = range(4)
 TO_LOCATE, TO_MEASURE = 0, 1
 _BELOW: Final = 1.0 - 2.0**-48
 _ABOVE: Final = 1.0 + 2.0**-48
+_TINY: Final = 2.0**-1072
+"""More than denormal numbers lose."""
+_LARGEST: Final = 2.0**1023 * (2.0 - 2.0**-52)
+_REACH: Final = 2.0**1000
+"""Coordinates of a tree, up to which a point is looked up there."""
 
 
 class Nearest(NamedTuple):
@@ -64,14 +69,13 @@ Notes = namedtuple("Notes", "rows bounds n")
 
 @inline
 def _gap(point: FloatArray, bodies: BodyTree, body: int) -> tuple[float, float]:
-    """Return a lower bound on the distance of a point (d,) from a body, and an upper one, by the body's box."""
+    """Return a lower bound on the distance of a point (d,) from a body, and an upper one, by the body's box. Squares
+    would leave the range of doubles: of tiny scenes an upper bound would be 0, of huge ones a lower one infinite."""
     near, far = 0.0, 0.0
     for k in range(point.size):
         below, above = bodies.low[body, k] - point[k], point[k] - bodies.high[body, k]
-        gap, width = max(below, above, 0.0), max(-below, -above)
-        near, far = near + gap * gap, far + width * width
-    near = np.sqrt(near) * _BELOW
-    return (near if near < np.inf else 0.0), np.sqrt(far) * _ABOVE
+        near, far = hypot(near, max(below, above, 0.0)), hypot(far, max(-below, -above))
+    return max(0.0, min(near, _LARGEST) * _BELOW - _TINY), far * _ABOVE + _TINY
 
 
 @inline
@@ -181,8 +185,11 @@ def find_nearest_bodies(
         for side in range(1 + (words[1, N_BODIES] > 0)):
             bodies, rows = tree_in(words[side], points.shape[1]), still if side == 0 else moved
             o, x, z = bodies.tree.origin, bodies.inverse, point[2] if point.size == 3 else 0.0
-            spot = spot_of(Point3((point[0] - o[0]) * x, (point[1] - o[1]) * x, (z - o[2]) * x), 0.0)
-            has_tree, is_far = bodies.bounded.size > 0, spot.spread > 0.0 and bodies.bounded.size > 0
+            at = Point3((point[0] - o[0]) * x, (point[1] - o[1]) * x, (z - o[2]) * x)
+            is_in_reach = abs(at.x) < _REACH and abs(at.y) < _REACH and abs(at.z) < _REACH
+            spot = spot_of(at if is_in_reach else Point3(0.0, 0.0, 0.0), 0.0)
+            has_tree = bodies.bounded.size > 0
+            is_far = has_tree and (spot.spread > 0.0 or not is_in_reach)
             turn, n_turns, upper = 0, words[side, N_BODIES] if is_far else bodies.listed.size, np.inf
             if is_far:
                 upper = _bound_of_all(point, bodies, side, words)
@@ -192,7 +199,7 @@ def find_nearest_bodies(
                 if level > 0:
                     most = limit_of(spot, _most_of(nearest, item, limit) * x * _ABOVE)
                     child, level = next_child(bodies.tree, way, level, most)
-                    if level == 0 or child == EMPTY:
+                    if level == 0:
                         continue
                     if child >= 0:
                         level = enter_node(bodies.tree, child, spot, way, level)

@@ -166,7 +166,9 @@ def cut(
     The result is the closure of what the open interiors have in common, without flat parts; outside, of the open
     interior without the region. A vertex on a plane counts as not in that, an edge that ends there is cut at it.
 
-    Degenerate input: where nothing is left, no vertices and faces. Shells count by nesting, see `volume`.
+    Degenerate input: where nothing is left, no vertices and faces. Shells count by nesting, see `volume`. Where the
+    shells of a solid lie on each other, the faces of both stay: volumes are right, areas count them, and a part without
+    volume may be left.
 
     Accuracy: which faces there are, and that they close, is exact: every side of a face is used as often in one
     direction as in the other, by index and so by position. Coordinates are the nearest doubles. Rounding may flatten

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import os
 import subprocess
 import sys
@@ -125,5 +126,10 @@ def test_a_seed_is_packed_and_read_as_it_was(tmp_path: Path, monkeypatch: pytest
         assert kernel_cache.read_cached(name) == code
         (tmp_path / name).write_bytes(packed[:-9] + bytes(9))
         assert kernel_cache.read_cached(name) is None
+        kernel_cache.seal(tmp_path)  # does not make it good
+        assert not (tmp_path / name).exists()
+        for content in (packed[32:-9], packed[32:44], lzma.compress(bytes(1 << 27))):
+            kernel_cache.write_cached(name, content)
+            assert kernel_cache.read_cached(name) is None
     finally:
         kernel_cache.cache_folder.cache_clear()

@@ -345,3 +345,15 @@ def test_distances_beyond_the_range_are_refused_of_a_layer_at_the_origin_too() -
             layers.sjoin_nearest(left, right)
         with pytest.raises(engine.NotRepresentableError, match="scale the layers"):
             layers.sjoin(left, right, predicate="dwithin", distance=1.0)
+
+
+def test_points_and_polygons_dissolve_without_any_line() -> None:
+    """There was nothing to join, and numpy said so."""
+    square, through = shapely.box(0, 0, 1, 1), shapely.LineString([(2, 2), (2, 2)])
+    for other, expected in (
+        (shapely.Point(0.5, 0.5), square),
+        (shapely.Point(5, 0.5), shapely.GeometryCollection([shapely.Point(5, 0.5), square])),
+        (through, square),
+    ):
+        made = layers.dissolve(geopandas.GeoDataFrame(geometry=[other, square])).geometry.iloc[0]
+        assert made.normalize().equals(expected.normalize())

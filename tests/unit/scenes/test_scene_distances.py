@@ -88,3 +88,25 @@ def test_options_and_bodies_that_are_refused() -> None:
     with pytest.raises(UnsupportedSolidError, match="distances are not measured") as error:
         Scene([box, engine.Csg("union", [box])]).distances([[3, 0]])
     assert error.value.where == ("solids", 1)
+
+
+@pytest.mark.parametrize("size", [1e-160, 1e-163, 1e-181, 1e-300])
+def test_tiny_scenes_have_the_nearest_body_from_near_and_from_very_far(size: float) -> None:
+    """Squares underflowed, and a point without a direction in the tree ended the process."""
+    corners = [np.array([k * size * 1e-5, 0, 0]) for k in range(5)]
+    bodies = [engine.Aabb(low, low + size * 1e-6) for low in corners]
+    for point in ([3 * size, 0, 0], [1e250, 0, 0], [-1e299, 0, 0]):
+        alone = [float(engine.distances([point], body)[0]) for body in bodies]
+        found = engine.Scene(bodies).distances([point])
+        assert (found.distance[0], found.body[0]) == (min(alone), alone.index(min(alone)))
+        for limit in (min(alone), np.nextafter(min(alone), 0), np.nextafter(min(alone), np.inf)):
+            each = [bool(engine.distances([point], body, within=float(limit))[0]) for body in bodies]
+            assert engine.Scene(bodies).distances([point], within=float(limit)).tolist() == [any(each)]
+
+
+def test_a_body_beyond_doubles_is_not_measured_where_another_is_nearer() -> None:
+    near, far = engine.Aabb([1e308] * 3, [1e308] * 3), engine.Aabb([-1e308] * 3, [-1e308] * 3)
+    alone = engine.distances([[1.7e308] * 3], near)[0]
+    assert [engine.Scene(some).distances([[1.7e308] * 3]).distance[0] for some in ([near, far], [far, near])] == [
+        alone
+    ] * 2
