@@ -25,6 +25,7 @@ from engine.distance.point_mesh import NOWHERE, OTHER, Features, mesh_at, write_
 from engine.distance.point_search import (
     Goal,
     PointRoom,
+    Spot,
     enter_node,
     limit_of,
     measure_from,
@@ -158,6 +159,23 @@ def _bound_of_all(point: FloatArray, bodies: BodyTree, side: int, words: IntArra
     return least
 
 
+@inline
+def _next_body(
+    bodies: BodyTree, way: PointRoom, spot: Spot, most: float, level: int, turn: int, is_far: bool
+) -> tuple[int, int, int]:
+    """Return (body, level, turn): the next body to be measured, -1 if there is none, and where to go on from: those in
+    the tree within `most`, about nearest first, then those listed; all in turn if the point is_far from them."""
+    while level > 0:  # bound: each node is entered once
+        child, level = next_child(bodies.tree, way, level, limit_of(spot, most * bodies.inverse * _ABOVE))
+        if level > 0 and child < 0:
+            return bodies.bounded[-1 - child], level, turn
+        if level > 0:
+            level = enter_node(bodies.tree, child, spot, way, level)
+    if turn < (bodies.low.shape[0] if is_far else bodies.listed.size):
+        return turn if is_far else bodies.listed[turn], 0, turn + 1
+    return -1, 0, turn
+
+
 @kernel
 def find_nearest_bodies(
     points: FloatArray, last: int, words: IntArray, still: IntArray, moved: IntArray, limit: float, nearest: Nearest,
@@ -190,23 +208,13 @@ def find_nearest_bodies(
             spot = spot_of(at if is_in_reach else Point3(0.0, 0.0, 0.0), 0.0)
             has_tree = bodies.bounded.size > 0
             is_far = has_tree and (spot.spread > 0.0 or not is_in_reach)
-            turn, n_turns, upper = 0, words[side, N_BODIES] if is_far else bodies.listed.size, np.inf
-            if is_far:
-                upper = _bound_of_all(point, bodies, side, words)
-            level = enter_node(bodies.tree, 0, spot, way, 0) if has_tree and not is_far else 0
-            while level > 0 or turn < n_turns:  # bound: each node is entered once, each body measured once
-                body = turn if is_far or level > 0 else bodies.listed[turn]
-                if level > 0:
-                    most = limit_of(spot, _most_of(nearest, item, limit) * x * _ABOVE)
-                    child, level = next_child(bodies.tree, way, level, most)
-                    if level == 0:
-                        continue
-                    if child >= 0:
-                        level = enter_node(bodies.tree, child, spot, way, level)
-                        continue
-                    body = bodies.bounded[-1 - child]
-                else:
-                    turn += 1
+            upper = _bound_of_all(point, bodies, side, words) if is_far else np.inf
+            level, turn = enter_node(bodies.tree, 0, spot, way, 0) if has_tree and not is_far else 0, 0
+            while True:  # bound: each body is measured once
+                most = _most_of(nearest, item, limit)
+                body, level, turn = _next_body(bodies, way, spot, most, level, turn, is_far)
+                if body < 0:
+                    break
                 if side == 0 and has_moved(words, body):
                     continue
                 if limit < np.inf and nearest.distance[item] == 0.0:
