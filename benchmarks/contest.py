@@ -282,7 +282,7 @@ def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _En
         if each.name == "ours":
             raise
         how = "" if isinstance(error, ImportError | OSError) else "raised "
-        row.absent = f"{how}{type(error).__name__}: {error}".splitlines()[0]
+        row.absent = f"{how}{contenders.said_by(error)}"
         if isinstance(error, contenders.NotApplicable):
             row.absent = f"not asked: {error}"
         return None

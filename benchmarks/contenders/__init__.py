@@ -90,6 +90,12 @@ def shown(module: str, kind: str) -> str:
     return names.get(kind) or names.get("", module)
 
 
+def said_by(error: Exception) -> str:
+    """Return what a peer raised in one line: without colours, and of paths of its builder's machine the file alone."""
+    text = f"{type(error).__name__}: {error}".splitlines()[0]
+    return re.sub(r"(?<![\w.])/(?:[\w.+-]+/)+", "", re.sub(r"\x1b\[[\d;]*m", "", text))
+
+
 class NotApplicable(Exception):
     """The contender does not answer this kind of question."""
 

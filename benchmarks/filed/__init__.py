@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import engine
-from benchmarks.contenders import NotApplicable, Placed, answers, readers_of, rings_of, stated
+from benchmarks.contenders import NotApplicable, Placed, answers, readers_of, rings_of, said_by, stated
 from benchmarks.filed import museum
 from benchmarks.machine import version_of
 from benchmarks.workloads import Mesh, Rings
@@ -246,7 +246,7 @@ def _answer(peer: Peer, case: Case) -> tuple[str, str, list[int]]:
         return "not applicable", "", []
     except Exception as error:  # whatever a peer raises
         outcome = "absent" if isinstance(error, ImportError | OSError) else "refused"
-        return outcome, f"{type(error).__name__}: {error}".splitlines()[0], []
+        return outcome, said_by(error), []
 
 
 def _serve(pipe: Connection, name: str) -> None:
