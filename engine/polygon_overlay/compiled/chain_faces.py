@@ -33,7 +33,15 @@ from engine.polygon_overlay.compiled.chains import (
     representative_of,
     to_the_left,
 )
-from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
+from engine.polygon_overlay.compiled.crossing_signs import (
+    Edges,
+    crossing_against,
+    doubt_zero,
+    exact_weight,
+    flushed,
+    orient,
+    turn_of_edges,
+)
 from engine.polygon_overlay.compiled.edge_contacts import Events
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import (
@@ -106,7 +114,7 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
     x = edges.x
     a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
     c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
-    side = _compare_heights(edges, v, a, b, c, d)
+    side = doubt_zero(edges, _compare_heights(edges, v, a, b, c, d), e, f, v)
     if side != 0:
         return side < 0
     turn = turn_of_edges(edges, e, f)  # equal here: the one that falls more, or rises less, is nearer to the right
@@ -116,16 +124,16 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
 @inline
 def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
     """Return the exact sign of ``height(ab) - height(cd)``, the heights above vertex v at which the vertical line
-    through v meets edges ab and cd: ``height(ab) = -orient(a, b, v) / (x_b - x_a)``. a, b, c, d: vertices; caller
-    guarantees x_a < x_b, x_c < x_d."""
+    through v meets edges ab and cd: ``height(ab) = -orient(a, b, v) / (x_b - x_a)``; 0 also where an infinitesimal
+    decides. a, b, c, d: vertices; caller guarantees x_a < x_b, x_c < x_d."""
     x = edges.x
     first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
     n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)
-    wide, tail = two_diff(x[c], x[d])  # negative: heights are minus the weights
+    wide, tail = two_diff(flushed(x[c]), flushed(x[d]))  # negative: heights are minus the weights
     k = add_scaled(total, 0, first, n, wide)
     if tail != 0.0:
         k = add_scaled(total, k, first, n, tail)
-    wide, tail = two_diff(x[b], x[a])
+    wide, tail = two_diff(flushed(x[b]), flushed(x[a]))
     k = add_scaled(total, k, second, m, wide)
     if tail != 0.0:
         k = add_scaled(total, k, second, m, tail)

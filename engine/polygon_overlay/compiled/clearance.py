@@ -46,6 +46,7 @@ from engine.polygon_overlay.compiled.crossing_signs import (
     crossing_against,
     exact_cross,
     exact_weight,
+    flushed,
     weight_of,
 )
 from engine.polygon_overlay.compiled.edge_contacts import Events, is_far, segments_are_far
@@ -73,7 +74,7 @@ from engine.predicates.error_free import (
 )
 from engine.predicates.expansion import add_scaled, compress, is_safe, sign
 from engine.predicates.orientation import orient2d
-from engine.types import FlagArray, FloatArray, Int32Array, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int32Array, Point2
 
 CUT_BOUND: Final = 40.0 * U2
 LOST: Final = -1.0
@@ -235,7 +236,8 @@ def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
     na, nb = exact_weight(edges, f, fb, a, wa), exact_weight(edges, f, fb, b, wb)
     factor = 1.0 if sign(wa, na) > 0 else -1.0  # the weights are of opposite signs
     above, below = workspace(64), workspace(64)  # 2 * 16 components for each of two products
-    n = add_scaled(above, add_scaled(above, 0, wa, na, factor * z[b]), wb, nb, -factor * z[a])
+    p, q = flushed(z[a]), flushed(z[b])
+    n = add_scaled(above, add_scaled(above, 0, wa, na, factor * q), wb, nb, -factor * p)
     m = add_scaled(below, add_scaled(below, 0, wa, na, factor), wb, nb, -factor)
     nh, nl = leading(above, n)
     dh, dl = leading(below, m)
@@ -351,7 +353,8 @@ def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: FlagA
             if k & POLL == 0 and stop[0]:
                 return True
             if (moved[i] | moved[j] | moved[k]) and not rings.meets[j] & (MEETS | RUN):
-                if orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k])) == 0:
+                turn = orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k]))
+                if turn == 0 or turn == UNDECIDED:
                     return True
             i, j = j, k
     return False

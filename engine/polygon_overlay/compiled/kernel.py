@@ -9,7 +9,7 @@ crossings. Decisions are exact throughout. Outcomes of a pair (`PairStatus`, or 
 | --- | --- |
 | DONE | the rounded rings are proven valid |
 | MAY_CROSS | rounding came within the margin of clearance.py: the rings are arranged again (ring_nesting.py) |
-| OPEN | exact fallback: a coordinate outside 2^-120 .. 2^120, or not rounded, or no shell of rounded rings is proven |
+| OPEN | exact fallback: a coordinate out of range (crossing_signs.py), a sign in doubt, a point not rounded, no shell |
 
 Fast paths: two convex rings (convex.py), two simple rings with only proper crossings (`walk_crossings`). Scratch comes
 from the caller, who gives more and calls again where it does not suffice: nothing here allocates.
@@ -135,10 +135,10 @@ def _load_pair(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, selected: FlagArray,
     is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Load both polygons of a pair into ``w.given``; return the numbers of vertices and rings, and whether no nonzero
-    coordinate is below SMALLEST. span: their rings; common: the intersection of their boxes, outside of which stretches
-    are shortened where the result has no part. is_named: the mask of a ring is its number, not the bit of its polygon.
-    """
+    """Load both polygons of a pair into ``w.given``; return the numbers of vertices and rings, and whether coordinates
+    are 0, infinitesimal or SMALLEST and above. span: their rings; common: the intersection of their boxes, outside of
+    which stretches are shortened where the result has no part. is_named: the mask of a ring is its number, not the bit
+    of its polygon."""
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, is_in_range = load_rings(
@@ -155,7 +155,7 @@ def _load_pair(
 @merged
 def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, stop: FlagArray) -> _Arrangement:
     """Node a loaded pair, label its faces and trace its boundary rings into ``w.rings``; return the counts. selected:
-    by label the part of the result, 0 outside. The result is invalid if ``stop`` is set."""
+    by label the part of the result, 0 outside. The result is invalid if ``stop`` is set, or a sign is in doubt."""
     n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     margin = CLEARANCE * loaded.largest
     is_clear = fill_boxes(edges, n, margin, w.tree, stop) > margin
@@ -174,7 +174,7 @@ def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting
     if n_contacts > room:
         return _Arrangement(0, 0, 0, 0, False, n_contacts)
     are_clear = sort_events(edges, w.events, w.along, w.unions, n, contacts.n_events, stop)
-    if stop[0]:
+    if stop[0] or edges.doubts[0] != 0:
         return _NONE
     if nesting.rule == Rule.PAIR and has_only_proper_crossings(w.given, w.events, contacts, n_rings, selected):
         n_boundary, n_points = walk_crossings(
@@ -203,13 +203,13 @@ def _arrange_chains(
     if stop[0]:
         return 0, 0
     build_stars(edges, w.chains, w.stars, w.loose, n_crossings, n_nodes, n_loose, stop)
-    if stop[0]:
+    if stop[0] or edges.doubts[0] != 0:  # what follows takes the order of edges for granted
         return 0, 0
     n_cycles = number_cycles(w.chains, w.stars, w.faces.cycle, n_chains, stop)
     if stop[0]:
         return 0, 0
     join_faces(w, w.rings.point, (n, n_cycles, loaded.n_runs), stop)
-    if stop[0]:
+    if stop[0] or edges.doubts[0] != 0:
         return 0, 0
     has_provenance = nesting.rule == Rule.AGAIN
     n_entries = propagate_labels(w.given, w.chains, w.faces, nesting, w.flood, selected, (n_chains, n_cycles), stop)
@@ -321,11 +321,14 @@ def overlay_pairs(
                 continue
         first, end = span.first, span.first_end
         own = Nesting(nesting.shells[first:end], nesting.sizes[first:end], nesting.rule)
+        w.given.edges.doubts[0] = 0
         arranged = _arrange(w, loaded, selected, own, stop)
         if stop[0]:
             break
         if arranged.n_contacts > w.along.order.shape[0] - 9:
             return _progress(pair, NEEDS_CONTACTS, filled, 0)
+        if w.given.edges.doubts[0] != 0:
+            continue
         moved_by, is_valid = _round(w, loaded.n, arranged, stop)
         if moved_by == LOST:
             continue
@@ -349,6 +352,8 @@ def overlay_pairs(
         write_rings(w, loaded.n, n_boundary, output, filled, stop)
         if stop[0]:
             break
+        if w.given.edges.doubts[0] != 0:  # of signs that chains, faces, rounding and sources asked for
+            continue
         if loaded.n_runs > 0:
             for ring in range(n_boundary):
                 n_left_out += count_left_out(output.sources, output.rings[ring], output.rings[ring + 1])

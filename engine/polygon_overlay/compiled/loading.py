@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.compiling.jit import inline, kernel, merged
-from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.crossing_signs import INFINITESIMAL, Edges
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
     BENT,
@@ -95,7 +95,8 @@ def load_rings(
     n: int, n_rings: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append the rings first_ring .. last_ring - 1, repeated points merged, to ``given``, after its n vertices and
-    n_rings rings; return the numbers of vertices and rings then, and whether no nonzero |coordinate| is below SMALLEST.
+    n_rings rings; return the numbers of vertices and rings then, and whether every |coordinate| is 0, infinitesimal or
+    SMALLEST and above.
 
     mask: of each ring; is_named: the mask is the ring's number from ``first_ring`` on instead. base: added to vertex
     numbers in ``origins``. box: of consecutive vertices beyond one of its sides only the first and the last are loaded.
@@ -112,7 +113,8 @@ def load_rings(
             if k & POLL == 0 and stop[0]:
                 return 0, 0, False
             px, py = vertices[k, 0], vertices[k, 1]
-            is_in_range &= ((abs(px) >= SMALLEST) | (px == 0.0)) & ((abs(py) >= SMALLEST) | (py == 0.0))
+            is_in_range &= (abs(px) >= SMALLEST) | (abs(px) < INFINITESIMAL)
+            is_in_range &= (abs(py) >= SMALLEST) | (abs(py) < INFINITESIMAL)
             if px == qx and py == qy:
                 origins[n - 1] = base + k  # the next edge begins here
                 continue

@@ -19,7 +19,7 @@ from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, RUN, box_cont
 from engine.polygon_overlay.compiled.loading import LEFT_OUT
 from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, write_evidence
 from engine.predicates.orientation import orient2d
-from engine.types import FlagArray, FloatArray, Int32Array, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int32Array, Point2
 
 Output = namedtuple("Output", "vertices sources rings pieces evidence")
 """Results, pair after pair: vertices (m, 2) float64; sources (m, 2) int32; offsets of rings into vertices and of pieces
@@ -162,7 +162,7 @@ def rank_rings(
 @inline
 def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: FlagArray) -> int:
     """Write to ``ranking`` the index and coordinates of the smallest vertex (x, then y) of a ring; return the sign of
-    the ring's turn there (1 left, -1 right), 0 also if stopped."""
+    the ring's turn there (1 left, -1 right), 0 also if it is not decided or stopped."""
     x, y = rounded.x, rounded.y
     first, last = rings.offset[ring], rings.offset[ring + 1]
     low = first
@@ -173,7 +173,8 @@ def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, 
             low = k
     ranking.start[ring], ranking.x[ring], ranking.y[ring] = low, x[low], y[low]
     before, after = (low if low > first else last) - 1, low + 1 if low + 1 < last else first
-    return orient2d(Point2(x[before], y[before]), Point2(x[low], y[low]), Point2(x[after], y[after]))
+    turn = orient2d(Point2(x[before], y[before]), Point2(x[low], y[low]), Point2(x[after], y[after]))
+    return 0 if turn == UNDECIDED else turn
 
 
 class Filled(NamedTuple):

@@ -181,7 +181,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
         point_integers=np.empty((_POINT_INTEGERS, m), np.int32),
         point_octets=np.empty((_POINT_OCTETS, m), np.uint8), boxes=np.empty((m, 4)),
         tree=np.empty((2 * n_leaves, 4)), tree_marks=np.empty(2 * n_leaves, np.uint8),
-        stack=np.empty((DEEPEST, 2), np.int64), pairs=np.empty((PORTION, 2), np.int32),
+        stack=np.empty((DEEPEST + 1, 2), np.int64), pairs=np.empty((PORTION, 2), np.int32),
         ends=np.empty((k + 1, 4), np.int32),
     )  # fmt: skip
 
@@ -220,12 +220,12 @@ def workspace_at(addresses: IntArray) -> Workspace:
     px, p = array_at(at[8], (_POINT_FLOATS, m), np.float64), array_at(at[9], (_POINT_INTEGERS, m), np.int32)
     pb, ends = array_at(at[10], (_POINT_OCTETS, m), np.uint8), array_at(at[16], (k + 1, 4), np.int32)
     boxes, nodes = array_at(at[11], (m, 4), np.float64), array_at(at[12], (n_nodes, 4), np.float64)
-    node_marks, stack = array_at(at[13], (n_nodes,), np.uint8), array_at(at[14], (DEEPEST, 2), np.int64)
+    node_marks, depths = array_at(at[13], (n_nodes,), np.uint8), array_at(at[14], (DEEPEST + 1, 2), np.int64)
     pairs = array_at(at[15], (PORTION, 2), np.int32)
     crossing_x, crossing_y, error = cx[3], cx[4], cx[1]
     return Workspace(
-        given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2]), v[3], r[0], r[1]),
-        tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], stack, pairs),
+        given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2], depths[DEEPEST]), v[3], r[0], r[1]),
+        tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], depths[:DEEPEST], pairs),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
         along=Along(v[4], c[12], crossing_x, crossing_y, c[13]),

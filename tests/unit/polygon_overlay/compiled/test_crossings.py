@@ -17,7 +17,7 @@ def edges_of(ends: np.ndarray) -> Edges:
     """Return segments (n, 2, 2) as edges 0, 2, 4, ..., each to the vertex after it."""
     x, y = np.ascontiguousarray(ends.reshape(-1, 2).T)
     there = np.arange(len(x)) ^ 1
-    return Edges(x, y, there, there, there)
+    return Edges(x, y, there, there, there, np.zeros(2, np.int64))
 
 
 def exact(edges: Edges, v: int) -> Point:
@@ -68,6 +68,26 @@ def test_signs_are_exact(seed: int) -> None:
                 assert crossing_against(edges, 0, f, axis, near, half) == expected
     if len(places) == 2:
         assert order_of_crossings(edges, 0, 2, 4) == sign(places[2] - places[4])
+
+
+TINY = 5e-324
+
+
+def test_infinitesimals_decide_nothing_and_say_so() -> None:
+    # two edges through (0.5, 0) but for infinitesimals, and a third that crosses both first ones elsewhere
+    edges = edges_of(np.array([[[0.0, 0.0], [1.0, TINY]], [[0.5, -1.0], [0.5, 1.0]], [[0.0, -0.5], [1.0, 0.5]]]))
+    assert order_of_crossings(edges, 0, 2, 4) == 0
+    assert edges.doubts[0] == 1  # not a tie: the first crosses at y = TINY / 2, the last at x = 0.5 + TINY / 2
+    edges.doubts[0] = 0
+    assert crossing_against(edges, 0, 2, 1, 0.0, 0.0) == 0
+    assert edges.doubts[0] == 1
+    edges.doubts[0] = 0
+    assert crossing_against(edges, 0, 2, 0, 0.25, 0.0) == 1
+    assert crossing_against(edges, 0, 2, 1, 0.25, 0.0) == -1
+    assert edges.doubts[0] == 0
+    assert orient(edges, 0, 1, 2) == -1
+    assert orient(edges, 0, 1, 3) == 1
+    assert [orient(edges, 0, 2, 1), orient(edges, 4, 5, 0)] == [1, 1]
 
 
 # --- Crossings rounded to the nearest doubles, as rational arithmetic has them ---

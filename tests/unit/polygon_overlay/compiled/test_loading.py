@@ -26,7 +26,8 @@ def loaded(rings: list[list[tuple[float, float]]], box: Box) -> tuple[list[list[
     """Return the numbers of the vertices that stay, ring by ring, the tops, and all that was filled."""
     vertices, offsets = np.array([v for ring in rings for v in ring], float), np.cumsum([0, *map(len, rings)])
     n, whole = len(vertices), np.zeros(len(vertices), np.int64)
-    given = Given(Edges(np.zeros(n), np.zeros(n), *(whole.copy() for _ in range(3))), *(whole.copy() for _ in range(3)))
+    edges = Edges(np.zeros(n), np.zeros(n), *(whole.copy() for _ in range(3)), np.zeros(2, np.int64))
+    given = Given(edges, *(whole.copy() for _ in range(3)))
     stop = np.zeros(1, np.uint8)
     arrays = RingArrays(vertices, offsets)
     n, n_rings, safe = load_rings(arrays, 0, len(rings), 1, False, 0, box, given, 0, 0, stop)
