@@ -28,6 +28,7 @@ from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.coverage import union_of_coverage
 from engine.polygon_overlay.grid import from_units, grid_of
+from engine.polygon_overlay.hidden import without_hidden
 from engine.polygon_overlay.implicit_rings import NO_RINGS, one_polygon
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.pair_arrays import PolygonArrays, polygon_arrays_of
@@ -286,7 +287,8 @@ def union_all(
     share vanish where they are one line exactly; `grid` makes them so.
 
     Cost: n log n for n edges in all, plus about a microsecond per crossing: 1,000 circles of 64 vertices 11 ms, 14,400
-    parcels that share all their edges 10 ms.
+    parcels that share all their edges 10 ms; polygons that a hundred others meet are united by groups first: 1,000
+    circles of 32 vertices about one place 40 ms.
 
     References
     ----------
@@ -376,7 +378,8 @@ def _arrange_all(
     if joined is not None:
         result, n_exact, n_rational = *joined, 0
     else:
-        flat = flat.without_repeats() if rule == Rule.ANY else flat  # each pair of their edges would be one contact
+        if rule == Rule.ANY:
+            flat = without_hidden(flat.without_repeats(), budget)  # of repeats each pair of edges would be one contact
         n_rings = np.diff(flat.polygon_offsets)  # polygons without rings have no number: a ring's is at least its own
         nesting = Nesting(np.repeat(np.cumsum(n_rings > 0) - 1, n_rings), np.zeros(0), int(rule))
         rings = RingArrays(*flat[:2])

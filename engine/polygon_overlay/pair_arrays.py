@@ -16,7 +16,7 @@ from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import join_columns
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted, summed
-from engine.types import FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.types import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 
 NO_EVIDENCE: Final = np.zeros((0, 2), np.int64)
 
@@ -160,6 +160,10 @@ class PolygonArrays(NamedTuple):
             rings = self.vertices[ends[0] : ends[-1]].tobytes(), (ends - ends[0]).tobytes()
             stays[number] = rings not in known
             known.add(rings)
+        return self.kept(stays)
+
+    def kept(self, stays: BoolArray) -> PolygonArrays:
+        """Return the polygons, number by number, without rings where ``stays`` is False."""
         if stays.all():
             return self
         n_rings = np.diff(self.polygon_offsets)

@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 import engine
+from engine.polygon_overlay import hidden
+from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.implicit_rings import NO_RINGS
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.overlay import less_all
+from engine.polygon_overlay.overlay import less_all, overlay_rings
+from engine.polygon_overlay.pair_arrays import polygon_arrays_of
 from engine.running.budget import Budget
 from tests.reference import fast_overlay
 from tests.reference import overlay as reference
@@ -33,6 +36,18 @@ RULES: dict[str, tuple[int, Callable[[int], bool]]] = {
 
 def square(x: float, y: float, size: float) -> list[tuple[float, float]]:
     return [(x, y), (x + size, y), (x + size, y + size), (x, y + size)]
+
+
+def circle_at(x: float, y: float) -> np.ndarray:
+    turns = np.arange(16) * np.pi / 8
+    return np.c_[np.cos(turns), np.sin(turns)] + np.array([x, y])
+
+
+def all_at_once(polygons: list[engine.Polygon]) -> Any:
+    """The union by one arrangement of all edges."""
+    flat = polygon_arrays_of(polygons)
+    nesting = Nesting(np.arange(len(polygons)), np.zeros(0), int(Rule.ANY))
+    return overlay_rings(RingArrays(*flat[:2]), NO_RINGS, "union", Budget(), nesting)[:2]
 
 
 def is_in_any(windings: tuple[int, ...]) -> bool:
@@ -139,6 +154,39 @@ def assert_union(draw: Callable[[Random], list[Rings]], seed: int | list[int]) -
         for ring, sources in zip(result.rings, np.split(result.sources, result.ring_offsets[1:-1]), strict=False):
             for (a, b), source in zip(pairwise([*ring.tolist(), ring[0].tolist()]), sources.tolist(), strict=True):
                 assert runs_along(layer, source, a, b)
+
+
+@pytest.fixture
+def small_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few polygons are taken for many: hidden ones are left out in groups of two, then of more."""
+    for name, value in {"_DEEP": 0.0, "_GROUP": 2, "_GROWS": 2, "_PAYS": 1.0, "_FUTILE": 1.0}.items():
+        monkeypatch.setattr(hidden, name, value)
+
+
+@pytest.mark.usefixtures("small_groups")
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("draw", [crowd, parcels, islands, of_a_family])
+def test_unions_without_what_is_hidden(draw: Callable[[Random], list[Rings]], seed: int) -> None:
+    assert_union(draw, 5000 + seed)
+
+
+@pytest.mark.usefixtures("small_groups")
+def test_a_hidden_polygon_that_fills_a_hole_stays() -> None:
+    frame = [[(0, 0), (9, 0), (9, 9), (0, 9)], [(3, 3), (6, 3), (6, 6), (3, 6)]]
+    layer = polygon_arrays_of([engine.Polygon(rings) for rings in (frame, [square(2, 2, 5)], [square(1, 1, 1)])])
+    assert np.diff(hidden.without_hidden(layer, Budget()).polygon_offsets).tolist() == [2, 1, 0]
+
+
+def test_many_on_each_other() -> None:
+    random = np.random.default_rng(5)
+    layer = [[circle_at(*random.normal(size=2) / 8)] for _ in range(150)]
+    polygons = [engine.Polygon(rings) for rings in layer]
+    few = hidden.without_hidden(polygon_arrays_of(polygons), Budget())
+    assert np.count_nonzero(np.diff(few.polygon_offsets)) < 30
+    result, (expected, _) = engine.union_all(polygons), all_at_once(polygons)
+    for name in ("vertices", "ring_offsets", "piece_offsets"):
+        assert getattr(result, name).tolist() == getattr(expected, name).tolist()
+    assert result.exact.exact_rings() == expected.exact.exact_rings()
 
 
 @pytest.mark.parametrize("draw", LAYERS)
