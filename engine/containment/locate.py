@@ -221,7 +221,8 @@ def locate(
             rational.append(counts.rational)
 
         try:
-            run_chunks(task, len(array), budget=budget, workers=workers, progress=progress)
+            first = len(array) if locator.is_long else SMALL_BATCH
+            run_chunks(task, len(array), budget=budget, first_chunk=first, workers=workers, progress=progress)
         except NotFiniteError:
             check_finite(array, ("points",))  # names the first of all
             raise

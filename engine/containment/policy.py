@@ -39,14 +39,17 @@ _FEW: Final = 192
 """Number of points up to which the tree is as fast as cells."""
 _FEW_RAYS: Final = 256
 """Product of points and faces up to which one pass costs less than handing a tree to the kernel."""
-_POINTS_A_PASS: Final = 1024
-_PASS_A_FACE: Final = 20.0
+_PASS_A_FACE, _PASS_A_POINT, _PASS_A_FACE_OVER, _PASS_MIXED = 20.0, 70.0, 9.0, 100.0
+"""Nanoseconds of a pass: for each face, each point, each face box above a point, and the root of faces times points
+(a face looks into several cells of points)."""
 LONG_PASS: Final = 1 << 12
 """Number of faces from which one pass takes so long that a batch should not be cut into chunks."""
 _TREE: Final = 40_000.0
-_TREE_A_FACE: Final = 280.0
-_SOON: Final = 1.0 / 16.0
-"""Share of the tree's cost that passes may take before the tree is built: usually the second batch builds the tree."""
+_TREE_A_FACE: Final = 350.0
+_SOON: Final = 1.0 / 8.0
+"""Share of the tree's cost that passes may take before the tree is built: usually the second or third batch builds it."""
+_ALONE: Final = 5e6
+"""What a batch may always take in one thread, as a pass does; more only if building the tree takes as long."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 500.0
 
 _IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
@@ -64,16 +67,14 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
         return Choice.CELLS
     if solid.cached("tree") is not None:
         return Choice.LISTS
-    if n_points > _POINTS_A_PASS and n_faces > LONG_PASS:
+    spent, tree = solid.prepared("passes", lambda: [0.0]), _TREE + _TREE_A_FACE * n_faces
+    over = mean_faces_above(solid) if spent[0] > 0.0 or n_points > SAMPLE else 0.0  # it takes 30 us to find out
+    by_points = n_points * (_PASS_A_POINT + _PASS_A_FACE_OVER * over)
+    by_pass = _PASS_A_FACE * n_faces + _PASS_MIXED * (n_points * n_faces) ** 0.5 + by_points
+    if spent[0] > _SOON * tree or by_points > max(tree, _ALONE) or by_pass > tree + n_points * cost_in_tree(solid):
         return Choice.LISTS
-    calls = solid.prepared("passes", lambda: [0.0])
-    earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
-    calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
-    if earlier > 0.0 or n_points > SAMPLE:  # it takes 30 us to find out
-        more = _PASS_A_FACE * mean_faces_above(solid) - cost_in_tree(solid)  # that a point costs in a pass
-        earlier += (seen - n_points) * more
-        tree -= n_points * more
-    return Choice.PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else Choice.LISTS
+    spent[0] += by_pass
+    return Choice.PASS
 
 
 def _cells_amortize(solid: Polyhedron, seen: int) -> bool:

@@ -46,14 +46,14 @@ def without_hidden(polygons: PolygonArrays, budget: Budget) -> PolygonArrays:
     numbers = numbers[_spatial_order(low, high)]
     size = _GROUP
     while size < _PAYS * len(numbers):  # bound: each turn leaves out a quarter, or makes groups larger
-        stays = _bounds_its_group(polygons.take(numbers), size, budget)
-        numbers = numbers[stays]
-        if stays.mean() > _FUTILE:
+        is_needed = _bounds_its_group(polygons.take(numbers), size, budget)
+        numbers = numbers[is_needed]
+        if is_needed.mean() > _FUTILE:
             break
-        size *= 1 if stays.mean() < _PAYS else _GROWS
-    is_kept = np.zeros(len(polygons.polygon_offsets) - 1, np.bool_)
-    is_kept[numbers] = True
-    return polygons.kept(is_kept)
+        size *= 1 if is_needed.mean() < _PAYS else _GROWS
+    stays = np.zeros(len(polygons.polygon_offsets) - 1, np.bool_)
+    stays[numbers] = True
+    return polygons.restricted(stays)
 
 
 def _depth(low: FloatArray, high: FloatArray) -> float:

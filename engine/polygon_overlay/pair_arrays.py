@@ -160,9 +160,9 @@ class PolygonArrays(NamedTuple):
             rings = self.vertices[ends[0] : ends[-1]].tobytes(), (ends - ends[0]).tobytes()
             stays[number] = rings not in known
             known.add(rings)
-        return self.kept(stays)
+        return self.restricted(stays)
 
-    def kept(self, stays: BoolArray) -> PolygonArrays:
+    def restricted(self, stays: BoolArray) -> PolygonArrays:
         """Return the polygons, number by number, without rings where ``stays`` is False."""
         if stays.all():
             return self

@@ -8,13 +8,14 @@ Zero-length segments are points.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
 from engine.compiling.jit import entry_of
 from engine.containment.locate import locate_small_batch
-from engine.containment.locators import Locator, locator_of
+from engine.containment.locators import Locator, locator_of, polyhedron_by
+from engine.containment.policy import Choice
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.decide_then_cut import FEW, Clipped, Plan
@@ -63,6 +64,8 @@ def clip_on_boundary(
         return few_pieces, len(open_ones), len(open_ones)
     chunks: dict[int, tuple[Pieces, IntArray]] = {}
     locator = locator_of(region).chosen(len(segments), budget)
+    if locator.is_long and len(segments) > _MOST_FEW:  # each chunk would pass over all faces
+        locator = polyhedron_by(cast("Polyhedron", region), Choice.LISTS, budget)
 
     def chunk(first: int, last: int) -> None:
         chunks[first] = clip_chunk(segments, first, last, region, locator, budget)

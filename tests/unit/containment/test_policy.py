@@ -35,7 +35,7 @@ def test_the_second_question_about_a_large_mesh_builds_the_tree() -> None:
 
 def test_a_long_pass_is_made_once() -> None:
     many = np.random.default_rng(0).uniform(0, 400, (3000, 3))
-    for n_points, choice in ((300, Choice.PASS), (1024, Choice.PASS), (1025, Choice.LISTS), (3000, Choice.LISTS)):
+    for n_points, choice in ((300, Choice.PASS), (1025, Choice.PASS), (3000, Choice.PASS), (100_000, Choice.CELLS)):
         solid = _boxes(400)
         assert len(solid.triangles) > LONG_PASS
         with Budget() as budget:
