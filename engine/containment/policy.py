@@ -47,7 +47,7 @@ LONG_PASS: Final = 1 << 12
 _TREE: Final = 40_000.0
 _TREE_A_FACE: Final = 350.0
 _SOON: Final = 1.0 / 8.0
-"""Share of the tree's cost that passes may take before the tree is built: usually the second or third batch builds it."""
+"""Share of the tree's cost that passes may take before the tree is built: by the second or third batch, usually."""
 _ALONE: Final = 5e6
 """What a batch may always take in one thread, as a pass does; more only if building the tree takes as long."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 500.0

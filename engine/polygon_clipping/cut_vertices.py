@@ -18,21 +18,28 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Final, NamedTuple
 
-from engine.compiling.jit import inline, merged
+import numpy as np
+
+from engine.compiling.jit import called, inline, merged
 from engine.polygon_clipping.rings import Plane
 from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND, point_along
+from engine.predicates.digits import SLOT, sign_of, store_double, sum_products
 from engine.predicates.error_free import (
     U2,
     dd_add,
     dd_div,
     dd_mul,
+    even_of,
     fma,
     is_correctly_rounded,
     two_diff,
     two_prod,
     two_sum,
 )
+from engine.types import UNDECIDED
 
+DOUBT: Final = -1
+"""Doubles do not prove a decision; also in place of a number of vertices."""
 VALUE_BOUND: Final = 16.0 * 2.0**-53
 """Relative error bound of a plane value in doubles: a term loses the low parts of row and vertex, a product, three
 sums; its size as much again."""
@@ -41,7 +48,14 @@ DD_VALUE_BOUND: Final = 32.0 * U2
 EDGE_BOUND: Final = 64.0 * U2
 TINY: Final = 2.0**-800
 WIDEST: Final = 2.0**-200
+_STEPS: Final = 4
+"""How many doubles away the nearest one may be: one, and more below the normal ones."""
+_ONE, _A, _B, _X2, _Y2, _PLACE, _H, _OTHER, _G2, _SUM = (place * SLOT for place in range(10))
+N_HEAP: Final = 10 * SLOT
+"""Places of the numbers of `settle` on its heap (digits.py), and the size of the heap."""
 Triple = tuple[float, float, float]
+Edge = tuple[float, float, float, float]
+"""A coordinate of the first and second end of an edge, then theirs along the axis of a plane."""
 
 
 @inline
@@ -127,7 +141,7 @@ def interpolate(x: Triple, y: Triple, s: CutWeights) -> Triple:
     return h, rest, 1.01 * (POINT_BOUND * (abs(x_h) + abs(mh)) + s.r * abs(dh)) + TINY
 
 
-Vertices = namedtuple("Vertices", "pool rests edges names")
+Vertices = namedtuple("Vertices", "pool rests edges names heap terms")
 """The vertices of a ring, original ones first, then the cut ones.
 
 | field | dtype, shape | meaning |
@@ -136,6 +150,7 @@ Vertices = namedtuple("Vertices", "pool rests edges names")
 | rests | float64 (room * dim * 2,) | by coordinate of a cut vertex its remainder and error bound |
 | edges | int32 (room,) | the original edge that leaves a vertex, by its first vertex, -1: along a plane |
 | names | tuple | one number an axis: the dimension is a compile-time constant |
+| heap, terms | int64 | scratch of `settle`: ten numbers (digits.py), and (6, 3) |
 """
 
 
@@ -146,6 +161,22 @@ def are_same(s: Vertices, v: int, u: int) -> bool:
     for k in range(d):
         is_same = is_same & (s.pool[v * d + k] == s.pool[u * d + k])
     return is_same
+
+
+@merged
+def sameness(s: Vertices, v: int, u: int, n_ring: int) -> int:
+    """Return 1 if vertices v and u are one point, 0 if not, DOUBT if that is not proven. Vertices below n_ring are
+    original ones."""
+    if not are_same(s, v, u):
+        return 0
+    is_known = True
+    for k in range(len(s.names)):
+        _, v_rest, v_bound = coordinate(s, v, k, n_ring)
+        _, u_rest, u_bound = coordinate(s, u, k, n_ring)
+        if abs(v_rest - u_rest) > v_bound + u_bound:
+            return 0
+        is_known = is_known and v_bound + u_bound == 0.0
+    return 1 if is_known else DOUBT
 
 
 @merged
@@ -182,6 +213,72 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
     return h, low, DD_VALUE_BOUND * size + 1.01 * moved + TINY
 
 
+@inline
+def _load(s: Vertices, x: float, y: float, a: float, b: float, place: float) -> None:
+    """Store the numbers of an edge and a plane as `_beyond` takes them."""
+    store_double(s.heap, _ONE, 1.0)
+    store_double(s.heap, _A, a)
+    store_double(s.heap, _B, b)
+    store_double(s.heap, _X2, 2.0 * x)
+    store_double(s.heap, _Y2, 2.0 * y)
+    store_double(s.heap, _PLACE, place)
+
+
+@inline
+def _set_term(s: Vertices, i: int, first: int, second: int, factor: int) -> None:
+    s.terms[i, 0], s.terms[i, 1], s.terms[i, 2] = first, second, factor
+
+
+@inline
+def _beyond(s: Vertices, h: float, other: float) -> int:
+    """Return the sign of P - g for the point P of `settle` and g = (h + other) / 2; UNDECIDED if numbers are too long.
+    That of ``2 (P - g) (a - b)``, the sum of six products."""
+    store_double(s.heap, _H, h)
+    store_double(s.heap, _OTHER, other)
+    _set_term(s, 0, _H, _ONE, 1)
+    _set_term(s, 1, _OTHER, _ONE, 1)
+    if not sum_products(s.heap, s.terms, 2, _G2):
+        return UNDECIDED
+    _set_term(s, 0, _A, _Y2, 1)
+    _set_term(s, 1, _A, _G2, -1)
+    _set_term(s, 2, _PLACE, _Y2, -1)
+    _set_term(s, 3, _X2, _B, -1)
+    _set_term(s, 4, _X2, _PLACE, 1)
+    _set_term(s, 5, _G2, _B, 1)
+    return sign_of(s.heap, _SUM) if sum_products(s.heap, s.terms, 6, _SUM) else UNDECIDED
+
+
+@called
+def settle(s: Vertices, coordinate: Triple, edge: Edge, place: float) -> tuple[Triple, bool]:
+    """Return ((h, rest, bound), is_known): the double nearest to P = x + t (y - x), t = (a - place) / (a - b), ties to
+    even, and what is left, by exact signs. coordinate: the same as doubles tell it. is_known is False where h is some
+    doubles off, as it may be near 0, or numbers are too long for digits.py."""
+    (h, rest, bound), (x, y, a, b) = coordinate, edge
+    if abs(h) <= bound:
+        h, rest = 0.0, h + rest
+    _load(s, x, y, a, b, place)
+    toward = 1 if a > b else -1
+    side = toward * _beyond(s, h, h)
+    for _ in range(_STEPS):
+        if side == 0:
+            return (h + 0.0, 0.0, 0.0), True
+        other = np.nextafter(h, np.inf if side > 0 else -np.inf)
+        beyond = side * toward * _beyond(s, h, other)
+        if abs(side) > 1 or abs(beyond) > 1:
+            break
+        if beyond < 0:
+            return (h + 0.0, rest, bound), True
+        if beyond == 0:
+            near = even_of(h, other)
+            return (near + 0.0, h - near + rest, bound), True
+        h, rest = other, h - other + rest
+        after = toward * _beyond(s, h, h)
+        if after == -side:
+            return (h + 0.0, rest, bound), True
+        side = after
+    return (h, rest, bound), False
+
+
 @merged
 def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
     """Set vertex j to the crossing of the edge p q, both original vertices, with a plane across an axis; return whether
@@ -198,7 +295,9 @@ def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
                 near_double = h if abs(h) > bound else 0.0
                 if is_exactly_at(x, y, a, b, place, near_double):
                     h, rest, bound = near_double, 0.0, 0.0
-            is_certified = is_certified & is_correctly_rounded(h, rest, bound)
+            if not is_correctly_rounded(h, rest, bound):
+                (h, rest, bound), is_known = settle(s, (h, rest, bound), (x, y, a, b), place)
+                is_certified = is_certified & is_known
         set_coordinate(s, j, k, h, rest, bound)
     return is_certified
 

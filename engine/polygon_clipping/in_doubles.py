@@ -23,7 +23,16 @@ import numpy as np
 
 from engine.compiling.jit import allocating, called, merged
 from engine.lanes.lanes import move
-from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
+from engine.polygon_clipping.cut_vertices import (
+    DOUBT,
+    N_HEAP,
+    TINY,
+    VALUE_BOUND,
+    Vertices,
+    are_same,
+    cut_edge,
+    sameness,
+)
 from engine.polygon_clipping.rings import (
     CLIPPED,
     DONE,
@@ -38,8 +47,6 @@ from engine.polygon_clipping.rings import (
 )
 from engine.types import FlagArray, FloatArray, Int32Array
 
-DOUBT: Final = -1
-"""In place of a number of vertices: doubles do not prove a decision."""
 _SLACK: Final = 2.0**-45
 LONG: Final = 8
 """Smallest number of vertices of a ring that is grouped into runs; in shorter rings most vertices are runs of their
@@ -75,8 +82,9 @@ def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
     """Allocate scratch for rings that grow to `room` vertices, dropped ones included, and n_planes planes. names: its
     length is the dimension."""
     d = len(names)
+    heap, terms = np.empty(N_HEAP, np.int64), np.empty((6, 3), np.int64)
     return Scratch(
-        Vertices(np.empty(room * d), np.empty(2 * room * d), np.empty(room, np.int32), names),
+        Vertices(np.empty(room * d), np.empty(2 * room * d), np.empty(room, np.int32), names, heap, terms),
         Cutting(
             np.empty(n_planes, np.int64), np.empty(n_planes), np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
         ),
@@ -257,36 +265,46 @@ def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n
 def cut_ring(
     s: Scratch, plane: Plane, ring: Int32Array, n: int, made: Int32Array, n_ring: int, n_made: int
 ) -> tuple[int, int]:
-    """Clip a ring of n vertices, whose signs are set, by a plane into `made`: append, cross or drop each edge. Returns
+    """Clip a ring of n vertices, whose signs are set, by a plane into `made`: append, cross or drop each edge. A vertex
+    on the plane that is the same point as the one before it is merged into that one, which inherits its edge. Returns
     the number of vertices left, or DOUBT; and the number of vertices of all kinds then, n_made before, cut ones being
     numbered from there on."""
     signs, edges = s.signs, s.vertices.edges
-    n_left, was_on, first_on = 0, False, False
+    n_left, was_on, first_on, same = 0, False, False, 0
     signs[n] = signs[0]
     for i in range(n):
         v, sign, sign_after = ring[i], signs[i], signs[i + 1]
         if sign >= 0:
-            if sign == 0 and was_on and are_same(s.vertices, v, made[n_left - 1]):
-                return DOUBT, n_made
-            was_on = sign == 0
-            first_on = was_on if n_left == 0 else first_on
-            if was_on and sign_after < 0:
+            if sign == 0 and sign_after < 0:
                 edges[v] = -1
-            made[n_left] = v
-            n_left += 1
+            same = sameness(s.vertices, v, made[n_left - 1], n_ring) if sign == 0 and was_on else 0
+            if same == DOUBT:
+                return DOUBT, n_made
+            if same == 1:
+                edges[made[n_left - 1]] = edges[v]
+            else:
+                was_on = sign == 0
+                first_on = was_on if n_left == 0 else first_on
+                made[n_left] = v
+                n_left += 1
         if sign * sign_after >= 0:
             continue
         if not cut_edge(s.vertices, plane, v, ring[i + 1] if i + 1 < n else ring[0], n_ring, n_made):
             return DOUBT, n_made
-        if was_on and are_same(s.vertices, n_made, made[n_left - 1]):
-            return DOUBT, n_made
-        was_on, first_on = True, first_on or n_left == 0
         edges[n_made] = -1 if sign > 0 else edges[v]
-        made[n_left] = n_made
-        n_left += 1
+        same = sameness(s.vertices, n_made, made[n_left - 1], n_ring) if was_on else 0
+        if same == DOUBT:
+            return DOUBT, n_made
+        if same == 1:
+            edges[made[n_left - 1]] = edges[n_made]
+        else:
+            was_on, first_on = True, first_on or n_left == 0
+            made[n_left] = n_made
+            n_left += 1
         n_made += 1
-    if n_left > 1 and was_on and first_on and are_same(s.vertices, made[n_left - 1], made[0]):
-        return DOUBT, n_made
+    if n_left > 1 and was_on and first_on:
+        same = sameness(s.vertices, made[n_left - 1], made[0], n_ring)
+        n_left = DOUBT if same == DOUBT else n_left - same
     return n_left, n_made
 
 

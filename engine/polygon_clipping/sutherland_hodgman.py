@@ -20,8 +20,9 @@ from __future__ import annotations
 from typing import Any
 
 from engine.compiling.jit import allocating_kernel, inline
+from engine.polygon_clipping.cut_vertices import DOUBT
 from engine.polygon_clipping.in_digits import clip_exactly, exact_scratch
-from engine.polygon_clipping.in_doubles import DOUBT, clip_in_doubles, scratch_for
+from engine.polygon_clipping.in_doubles import clip_in_doubles, scratch_for
 from engine.polygon_clipping.rings import NO_ROOM, Clipped, PlaneTables, Polygons
 from engine.types import BoolArray, FlagArray, FloatArray, IntArray
 

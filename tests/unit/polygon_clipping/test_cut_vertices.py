@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from engine.polygon_clipping.clip_polygons import clip_polygons
-from engine.polygon_clipping.cut_vertices import CutWeights, edge_parameter, interpolate, is_exactly_at, point_on_edge
+from engine.polygon_clipping.cut_vertices import (
+    CutWeights,
+    edge_parameter,
+    interpolate,
+    is_exactly_at,
+    point_on_edge,
+    settle,
+)
+from engine.polygon_clipping.in_doubles import scratch_for
 from engine.polygon_clipping.in_integers import MOST_BITS, clip_polygon, integer_row, plane_through
 from engine.predicates.error_free import dd_add, dd_div
 from engine.solids.primitives import Aabb, Convex
@@ -155,3 +163,36 @@ def test_planes_through_vertices_need_no_rational_arithmetic(dimension: int) -> 
     assert accuracy.n_beyond_filter == 40
     assert accuracy.n_rational < 10
     check(contours, Convex(rows), clipped)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_coordinates_on_and_between_doubles_are_settled(seed: int) -> None:
+    """Ends an ulp off lattice points, neighbours of zero too: exact doubles, ties, and what comes near them."""
+    rng = np.random.default_rng(seed)
+    made = scratch_for(1, 1, (0, 1)).vertices
+    for _ in range(100):
+        a, b, x, y = (rng.integers(-4, 5, 4) / 4).tolist()
+        a, b, x, y = (float(np.nextafter(v, rng.choice([-9, v, 9]))) for v in (a, b, x, y))
+        place = float(rng.choice([-0.5, 0.0, 0.25, 1.0]))
+        if not min(a, b) < place < max(a, b):
+            continue
+        t = (Fraction(a) - Fraction(place)) / (Fraction(a) - Fraction(b))
+        exact = Fraction(x) + t * (Fraction(y) - Fraction(x))
+        th, tl, is_safe = edge_parameter(a, b, place)
+        if not is_safe:
+            continue
+        (h, rest, bound), is_known = settle(made, point_on_edge(x, y, th, tl), (x, y, a, b), place)
+        assert is_known
+        assert (h, str(h)[0]) == (float(exact), str(float(exact) + 0.0)[0])
+        assert abs(Fraction(h) + Fraction(rest) - exact) <= Fraction(bound)
+
+
+def test_an_ulp_beside_walls_needs_no_integers() -> None:
+    rng = np.random.default_rng(4)
+    turns = np.sort(rng.uniform(0, 2 * np.pi, (200, 12)), axis=1)
+    stars = np.stack([np.cos(turns), np.sin(turns)], -1) * rng.uniform(0.4, 1.6, (200, 12, 1))
+    contours = np.round((stars + rng.uniform(-1, 1, (200, 1, 2))) * 2) / 2
+    contours += rng.integers(-1, 2, contours.shape) * (rng.random(contours.shape) < 0.3) * np.spacing(np.abs(contours))
+    clipped, accuracy = clip_polygons(contours, Aabb([-1, -1], [1, 1]), report=True)
+    assert accuracy.n_beyond_filter < 16
+    check(contours, Aabb([-1, -1], [1, 1]), clipped)
