@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
+from engine.inspection.nesting import nesting
 from engine.running.budget import Budget, polled
 from engine.solid_cutting.faults import edges_of, junctions, shells_of
-from engine.solid_cutting.shells import nesting
 from engine.types import FloatArray, IntArray
 
 

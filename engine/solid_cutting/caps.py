@@ -28,7 +28,6 @@ from engine.running.budget import Budget
 from engine.solid_cutting.ears import bridge_of, clip_ears
 from engine.solid_cutting.face_cuts import find_turned, turn_rings
 from engine.solid_cutting.plane_cut import Plane, Points, without_repeats
-from engine.solid_cutting.shells import matched
 from engine.types import FloatArray, IntArray, read_only
 
 Ring = list[int]
@@ -149,7 +148,19 @@ def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoi
     def clockwise(one: Any, other: Any) -> int:
         return int(other[0] - one[0]) or sign_of(one[2] * other[1] - one[1] * other[2]) * -1
 
-    return matched([(side, is_incoming) for *_, side, is_incoming in sorted(rays, key=cmp_to_key(clockwise))])
+    return _parentheses([(side, is_incoming) for *_, side, is_incoming in sorted(rays, key=cmp_to_key(clockwise))])
+
+
+def _parentheses(ring: list[tuple[int, bool]]) -> list[tuple[int, int]]:
+    """Return the pairs (opening, closing) of a cyclic list of (item, whether it opens), matched as parentheses are."""
+    waiting: list[int] = []
+    pairs: dict[int, int] = {}
+    for each, opens in ring + ring:
+        if opens and each not in pairs and each not in waiting:
+            waiting.append(each)
+        elif not opens and waiting and each not in pairs.values():
+            pairs[waiting.pop()] = each
+    return list(pairs.items())
 
 
 def areas_of(view: Seen, rings: list[Ring], budget: Budget, is_exact: bool = False) -> tuple[list[Area], list[Ring]]:

@@ -13,12 +13,12 @@ from engine.polygon_clipping.planes import plan_of
 from engine.predicates.rational import cross, largest_axis, minus, scaled_integers, sign_of
 from engine.running.budget import Budget, Cancel, current
 from engine.running.parallel import Progress, check_options
+from engine.solid_cutting.boundary import Boundary, boundary
 from engine.solid_cutting.caps import cap_of, seen
 from engine.solid_cutting.cut_measures import area_of_cut, volume_of_cut
 from engine.solid_cutting.face_cuts import find_shapes
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles, plane_of
 from engine.solid_cutting.section import as_polyhedron
-from engine.solid_cutting.shells import outward
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown
@@ -166,9 +166,9 @@ def cut(
     The result is the closure of what the open interiors have in common, without flat parts; outside, of the open
     interior without the region. A vertex on a plane counts as not in that, an edge that ends there is cut at it.
 
-    Degenerate input: where nothing is left, no vertices and faces. Shells count by nesting, see `volume`. Where the
-    shells of a solid lie on each other, the faces of both stay: volumes are right, areas count them, and a part without
-    volume may be left.
+    Degenerate input: where nothing is left, no vertices and faces. A polyhedron is even-odd, see `volume`: of faces that
+    lie on each other what is no boundary is left out, and the rest is cut where their edges cross, as are the faces
+    beside it, so that every vertex is one of all faces that meet there.
 
     Accuracy: which faces there are, and that they close, is exact: every side of a face is used as often in one
     direction as in the other, by index and so by position. Coordinates are the nearest doubles. Rounding may flatten
@@ -227,9 +227,10 @@ def planes_in(region: Solid, budget: Budget) -> list[Plane]:
 
 
 class Left(NamedTuple):
-    """What planes leave of a mesh: triangles of points, their origins, as in `CutSolid` but by triangle of the solid,
-    and whether each is whole."""
+    """What planes leave of a mesh: triangles of points, their origins, as in `CutSolid` but by triangle of the boundary
+    of the solid, and whether each is whole."""
 
+    given: Boundary
     points: Points
     triangles: IntArray
     origins: IntArray
@@ -239,12 +240,14 @@ class Left(NamedTuple):
 
 def cut_by_planes(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     """Return what is inside all planes of a polyhedron, closed."""
-    points, triangles = Points(solid.vertices), outward(solid, budget)
-    origins = np.arange(len(triangles))  # triangles of the solid
+    given = boundary(solid, budget)
+    points, triangles, origins = given.points.copy(), given.triangles, np.arange(len(given.of))
     is_whole = np.ones(len(triangles), np.bool_)
     for number, plane in enumerate(planes):
         budget.check()
         sides = points.sides(plane, budget)
+        if not len(triangles):
+            break
         if sides.min() > 0:
             continue
         left = cut_triangles(points, triangles, plane, budget, sides)
@@ -253,9 +256,7 @@ def cut_by_planes(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Lef
         origins = np.concatenate([origins[left.whole], origins[left.of], np.full(len(cap), -1 - number)])
         n_new = len(left.pieces) + len(cap)
         is_whole = np.concatenate([is_whole[left.whole], np.zeros(n_new, np.bool_)])
-        if not len(triangles):
-            break
-    return Left(points, triangles, origins, is_whole, planes)
+    return Left(given, points, triangles, origins, is_whole, planes)
 
 
 def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
@@ -268,10 +269,10 @@ def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     if len(planes) == 1:
         return cut_by_planes(solid, [planes[0].reversed], budget)
     is_met = len(cut_by_planes(solid, planes, budget).triangles) > 0
-    given, planes = outward(solid, budget), [plane.reversed for plane in planes]
-    points, triangles, origins = Points(solid.vertices), given, np.arange(len(given))
+    given, planes = boundary(solid, budget), [plane.reversed for plane in planes]
+    points, triangles, origins = given.points.copy(), given.triangles, np.arange(len(given.of))
     if not is_met:
-        return Left(points, given, origins, np.ones(len(given), np.bool_), planes)
+        return Left(given, points, triangles, origins, np.ones(len(triangles), np.bool_), planes)
     parts, splits = [], [_NONE]
     for number, plane in enumerate(planes):
         budget.check()
@@ -289,7 +290,8 @@ def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     taken, of = (np.concatenate(each) for each in zip(*parts))
     taken, rows = _with_splits(taken, np.concatenate(splits), budget)
     taken, of = np.concatenate([taken, triangles[is_cap][:, ::-1]]), np.concatenate([of[rows], origins[is_cap]])
-    return Left(points, taken, of, (of >= 0) & (taken == given[np.maximum(of, 0)]).all(axis=1), planes)
+    is_whole = (of >= 0) & (taken == given.triangles[np.maximum(of, 0)]).all(axis=1)
+    return Left(given, points, taken, of, is_whole, planes)
 
 
 def _with_splits(triangles: IntArray, splits: IntArray, budget: Budget) -> tuple[IntArray, IntArray]:
@@ -320,7 +322,7 @@ def _with_splits(triangles: IntArray, splits: IntArray, budget: Budget) -> tuple
 
 def _part(solid: Polyhedron, left: Left, budget: Budget) -> CutSolid:
     """Return what is left as arrays of its own."""
-    points, triangles, origins, is_whole, _ = left
+    given, points, triangles, origins, is_whole, _ = left
     none = read_only(np.zeros(0, np.int64))
     if not len(triangles):
         return CutSolid(read_only(np.zeros((0, 3))), read_only(_NONE), none, none, none)
@@ -332,28 +334,28 @@ def _part(solid: Polyhedron, left: Left, budget: Budget) -> CutSolid:
     new = points.high[numbers[split:] - points.n_given]
     vertices = np.concatenate([points.vertices[numbers[:split]], new])
     budget.check()
-    collapsed, folded = _misshapen(solid, left, np.flatnonzero(~is_whole), budget)
+    collapsed, folded = _misshapen(left, np.flatnonzero(~is_whole), budget)
     is_of_solid = origins >= 0
-    faces_of = np.where(is_of_solid, solid.triangle_faces[np.where(is_of_solid, origins, 0)], origins)
+    faces_of = np.where(is_of_solid, solid.triangle_faces[given.of][np.where(is_of_solid, origins, 0)], origins)
     return CutSolid(
         read_only(vertices), read_only(number[triangles]), read_only(faces_of), collapsed, folded, points, triangles
     )
 
 
-def _misshapen(solid: Polyhedron, left: Left, rows: IntArray, budget: Budget) -> tuple[IntArray, IntArray]:
+def _misshapen(left: Left, rows: IntArray, budget: Budget) -> tuple[IntArray, IntArray]:
     """Return which of some triangles are flat after rounding, and which are turned over: seen along the axis on which
     the exact normal, of the cap's plane or of the face that each is a part of, is largest."""
-    points, triangles, origins, _, planes = left
-    faces, shapes = outward(solid, budget), np.empty(len(rows), np.int8)
+    given, points, triangles, origins, _, planes = left
+    faces, shapes = given.wholes, np.empty(len(rows), np.int8)
     normals = read_only(np.stack([plane.row for plane in planes]))
     with np.errstate(all="ignore"):
         corners = points.rounded(triangles[rows].ravel()).reshape(-1, 3, 3)
-        entry_of(find_shapes)(solid.vertices, faces, corners, origins[rows], normals, shapes)
+        entry_of(find_shapes)(points.vertices, faces, corners, origins[rows], normals, shapes)
     for number in np.flatnonzero(shapes == UNDECIDED).tolist():
         budget.check()
         origin = int(origins[rows[number]])
         is_cap = origin < 0
-        normal = tuple((-normals[-1 - origin, :3]).tolist()) if is_cap else _normal(solid.vertices[faces[origin]])
+        normal = tuple((-normals[-1 - origin, :3]).tolist()) if is_cap else _normal(points.vertices[faces[origin]])
         axis = largest_axis(normal)
         turn = _normal(corners[number])[axis] if normal[axis] else 0
         shapes[number] = sign_of(turn) * sign_of(normal[axis])

@@ -27,12 +27,18 @@ from engine.errors import NotRepresentableError
 from engine.predicates.rational import cross, minus, nearest_float, squared_length
 from engine.running.budget import Budget
 from engine.solid_cutting.caps import Area, Seen
-from engine.solid_cutting.exact_measures import ExactMesh, exact_mesh, exact_volume, nearest_area, nearest_root_over
+from engine.solid_cutting.exact_measures import (
+    ExactMesh,
+    exact_centroid,
+    exact_mesh,
+    exact_volume,
+    nearest_area,
+    nearest_root_over,
+)
 from engine.solid_cutting.plane_cut import Plane, Points
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_volume
 from engine.types import IntArray, read_only
 
-_NO_SIDES: Final = read_only(np.zeros(0, np.int8))
 _BITS: Final = (80, 128, 512, 2048)
 """Bits of a coordinate that are tried: to the first, points are known without their fractions (`plane_cut.py`)."""
 Whole = tuple[int, int, int]
@@ -93,7 +99,7 @@ def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: 
     z0 = float(points.vertices[given[0, 0], 2]) if len(given) else 0.0
     sums = np.zeros((1, 3))
     with np.errstate(all="ignore"):
-        entry_of(sum_volume)(points.vertices, given, _NO_SIDES, z0, sums, budget.flag)
+        entry_of(sum_volume)(points.vertices, given, z0, sums, budget.flag)
     budget.check()
     known, off = Fraction(sums[0, 0]) + Fraction(sums[0, 1]), Fraction(bound_of(float(sums[0, 2]), len(given)))
     rows = others.tolist()
@@ -119,6 +125,11 @@ def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: 
 def volume_in_fractions(points: Points, triangles: IntArray) -> Fraction:
     """Return the exact volume within a closed mesh of points, whose faces look outward."""
     return exact_volume(_as_fractions(points, triangles)) if len(triangles) else Fraction(0)
+
+
+def centroid_in_fractions(points: Points, triangles: IntArray) -> list[Fraction]:
+    """Return the exact centroid of what a closed mesh of points encloses. Raises: EmptyGeometryError."""
+    return exact_centroid(_as_fractions(points, triangles))
 
 
 def _as_fractions(points: Points, triangles: IntArray) -> ExactMesh:

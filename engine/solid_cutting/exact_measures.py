@@ -55,7 +55,7 @@ class ExactMesh(NamedTuple):
 
 def exact_mesh(points: Sequence[Sequence[Number]], faces: Iterable[tuple[int, ...]]) -> ExactMesh:
     """Return a mesh with its coordinates as integers."""
-    size = len(points[0])
+    size = len(points[0]) if points else 3
     ratios = [x.as_integer_ratio() for point in polled(list(points)) for x in point]
     w = lcm(*{bottom for _, bottom in ratios})
     numbers = [top * (w // bottom) for top, bottom in polled(ratios)]
@@ -65,7 +65,7 @@ def exact_mesh(points: Sequence[Sequence[Number]], faces: Iterable[tuple[int, ..
 def exact_volume(mesh: ExactMesh) -> Fraction:
     """Return the volume of a mesh, or the area of a ring, whose faces look outwards."""
     points, total = mesh.points, 0
-    if len(points[0]) == 2:
+    if points and len(points[0]) == 2:
         total = sum(points[i][0] * points[j][1] - points[j][0] * points[i][1] for i, j in polled(mesh.faces))
         return Fraction(total, 2 * mesh.w**2)
     total = sum(dot(points[i], cross(points[j], points[k])) for i, j, k in polled(mesh.faces))
@@ -75,7 +75,7 @@ def exact_volume(mesh: ExactMesh) -> Fraction:
 def exact_centroid(mesh: ExactMesh) -> list[Fraction]:
     """Return the centroid of what a mesh, or a ring, encloses. Raises: EmptyGeometryError if it has no volume."""
     points, volume = mesh.points, 0
-    size = len(points[0])
+    size = len(points[0]) if points else 3
     sums = [0] * size
     for face in polled(mesh.faces):
         corners = [points[k] for k in face]

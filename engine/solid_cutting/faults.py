@@ -21,7 +21,7 @@ from engine.predicates.rational import cross, scaled_integers, sign_of
 from engine.running.budget import Budget, polled
 from engine.solid_cutting.exact_measures import exact_faces, exact_volume
 from engine.solid_cutting.face_cuts import find_candidates
-from engine.types import FloatArray, IntArray, read_only
+from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
 class Edges(NamedTuple):
@@ -39,6 +39,13 @@ class Edges(NamedTuple):
     of: IntArray
     uses: IntArray
     net: IntArray
+
+    def parted(self, is_parted: BoolArray) -> Edges:
+        """Return edges as if faces were not joined at some of them."""
+        of, n = self.of.copy(), len(self.ends)
+        sides = is_parted[of]
+        of[sides] = np.arange(n, n + sides.sum())
+        return Edges(np.zeros((n + int(sides.sum()), 2), np.int64), of, self.uses, self.net)
 
 
 def edges_of(faces: IntArray) -> Edges:
@@ -132,7 +139,7 @@ def crossings(
         n_common = np.empty(len(pairs), np.int8)
         entry_of(find_candidates)(read_only(points), read_only(faces), read_only(pairs), n_common)
         pairs, n_common = pairs[n_common >= 0], n_common[n_common >= 0]
-        meets = np.zeros(len(pairs), np.bool_)
+        meets = n_common == 3
         for n, test in enumerate((_apart_meet, _at_corner_meet, _at_edge_meet)):
             some = np.flatnonzero(n_common == n)
             if len(some):

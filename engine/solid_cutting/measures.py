@@ -13,8 +13,9 @@ from engine.errors import NotRepresentableError, WrongDimensionError
 from engine.predicates.rational import SMALLEST_NORMAL, exponent_of, nearest_float, shifted
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
+from engine.solid_cutting.boundary import boundary, surface
+from engine.solid_cutting.cut_measures import area_of_cut, centroid_in_fractions, volume_of_cut
 from engine.solid_cutting.exact_measures import Measures, exact_centroid, exact_faces, exact_volume, nearest_area
-from engine.solid_cutting.shells import Shells, outward, shells
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
@@ -66,16 +67,16 @@ def volume(
 
     Notes
     -----
-    A polyhedron is even-odd: shells count by how they are nested, whatever way their faces are turned. Shells may touch
-    each other, in corners, along edges and with faces; where faces cross (each other, or those of another shell) the
-    call is refused, and so where a shell touches itself other than at common corners and edges.
+    A polyhedron is even-odd: what an odd number of shells holds is inside, whatever way their faces are turned. Shells
+    may touch themselves and each other, in corners, along edges and with faces; where faces pass through each other
+    the call is refused.
 
     Degenerate input: 0.0 for a flat or empty solid.
 
     Accuracy: sums in double-doubles with a proven bound, in integers where that does not decide.
 
-    Cost: some 0.02 us a face. The first call for a polyhedron that is not star-shaped also looks for faces that cross
-    and for shells, 4 us a face, which is cached with the solid.
+    Cost: some 0.02 us a face. The first call for a polyhedron that is not star-shaped also looks for faces that meet, 4
+    us a face, and cancels those that lie on each other, some 150 us for each of them; that is cached with the solid.
 
     References
     ----------
@@ -119,6 +120,8 @@ def area(
     ------
     UnsupportedSolidError
         A solid of another type, or an unbounded convex.
+    InvalidInputError
+        Some faces of a polyhedron pass through each other, and others lie on each other; the message names two.
     NotRepresentableError
         The area is beyond the largest double.
     DeadlineExceededError, CancelledError
@@ -126,14 +129,15 @@ def area(
 
     Notes
     -----
-    A polygon is even-odd, its rings may cross. Of a polyhedron or surface every face counts, one that another covers or
-    cancels too.
+    A polygon is even-odd, its rings may cross. The area of a polyhedron is that of the boundary of its interior: parts
+    of faces that lie on each other count once if an odd number do, else not. Of a surface every face counts.
 
-    Degenerate input: 0.0 for what has no area.
+    Degenerate input: 0.0 for what has no area. Faces of a polyhedron may pass through each other; if some lie on each
+    other too it is refused.
 
     Accuracy: as `volume`; sums of square roots are decided by as many digits as it takes.
 
-    Cost: some 0.05 us a face of a mesh; a polygon that of `union_all`.
+    Cost: some 0.05 us a face of a mesh, and of a polyhedron what `volume` does once; a polygon that of `union_all`.
 
     References
     ----------
@@ -233,18 +237,23 @@ def measure(solid: Solid, what: str, budget: Budget, where: Where = ("solid",)) 
 def _of_mesh(solid: Polyhedron, budget: Budget, what: str) -> tuple[Any, bool]:
     """Return the volume or centroid (`what`) of a polyhedron, and whether integers decided: not where the bound on the
     kernels' sums proves the rounding."""
-    looks = shells(solid, budget)
+    given = boundary(solid, budget)
+    triangles = given.triangles
+    if len(given.points) > len(solid.vertices):
+        if what == "volume":
+            return volume_of_cut(given.points, triangles, budget), False
+        return np.array([nearest_float(x) for x in centroid_in_fractions(given.points, triangles)]), True
     exponent = exponent_of(solid.vertices)
     points = shifted(solid.vertices, -exponent)
-    if points is not None:
+    if points is not None and len(triangles):
         with np.errstate(all="ignore"):
-            value = (_volume_of if what == "volume" else _centroid_of)(solid, points, looks, budget)
+            value = (_volume_of if what == "volume" else _centroid_of)(points, triangles, budget)
             result = None if value is None else np.ldexp(value, 3 * exponent if what == "volume" else exponent)
         budget.check()
         if result is not None and _is_scaled(result, exponent):
             return (float(result) if what == "volume" else result), False
     budget.check()
-    mesh = exact_faces(solid.vertices, outward(solid, budget))
+    mesh = exact_faces(solid.vertices, triangles)
     if what == "volume":
         return nearest_float(exact_volume(mesh)), True
     return np.array([nearest_float(x) for x in exact_centroid(mesh)]), True
@@ -258,22 +267,22 @@ def _is_scaled(result: Any, exponent: int) -> bool:
 
 
 def _six_volumes(
-    points: FloatArray, triangles: IntArray, looks: Shells, z0: float, budget: Budget
+    points: FloatArray, triangles: IntArray, z0: float, budget: Budget
 ) -> tuple[Fraction, Fraction] | None:
     """Return six times the volume, for z measured from z0, and a bound on its error; None where a sum overflows."""
     sums = np.zeros((1, 3))
-    entry_of(sum_volume)(read_only(points), triangles, looks.sides, z0, sums, budget.flag)
-    return _summed(sums[0], len(triangles), -1 if looks.common < 0 else 1)
+    entry_of(sum_volume)(read_only(points), triangles, z0, sums, budget.flag)
+    return _summed(sums[0], len(triangles))
 
 
-def _summed(sums: FloatArray, n: int, side: int, more: float = 0.0) -> tuple[Fraction, Fraction] | None:
-    """Return side times a sum of n terms, given as (high part, low part, sum of sizes), exactly, and a bound on its
+def _summed(sums: FloatArray, n: int, more: float = 0.0) -> tuple[Fraction, Fraction] | None:
+    """Return a sum of n terms, given as (high part, low part, sum of sizes), exactly, and a bound on its
     error, to which `more` is added."""
     h, low, size = sums.tolist()
     bound = bound_of(size, n) + more
     if not isfinite(h + low + bound):
         return None
-    return side * (Fraction(h) + Fraction(low)), Fraction(bound)
+    return Fraction(h) + Fraction(low), Fraction(bound)
 
 
 def _rounded(value: Fraction, error: Fraction) -> float | None:
@@ -285,22 +294,20 @@ def _rounded(value: Fraction, error: Fraction) -> float | None:
     return low if low == high else None
 
 
-def _volume_of(solid: Polyhedron, points: FloatArray, looks: Shells, budget: Budget) -> float | None:
-    triangles = read_only(solid.triangles)
-    six = _six_volumes(points, triangles, looks, float(points[triangles[0, 0], 2]), budget)
+def _volume_of(points: FloatArray, triangles: IntArray, budget: Budget) -> float | None:
+    six = _six_volumes(points, triangles, float(points[triangles[0, 0], 2]), budget)
     return None if six is None else _rounded(six[0] / 6, six[1] / 6)
 
 
-def _centroid_of(solid: Polyhedron, points: FloatArray, looks: Shells, budget: Budget) -> FloatArray | None:
-    triangles = read_only(solid.triangles)
+def _centroid_of(points: FloatArray, triangles: IntArray, budget: Budget) -> FloatArray | None:
     origin = read_only(points[triangles[0, 0]].copy())
-    six = _six_volumes(points, triangles, looks, float(origin[2]), budget)
+    six = _six_volumes(points, triangles, float(origin[2]), budget)
     if six is None or not six[1] < six[0]:
         return None
     (v, v_bound), sums, made = six, np.zeros((3, 3)), []
-    entry_of(sum_moments)(read_only(points), triangles, looks.sides, origin, sums, budget.flag)
+    entry_of(sum_moments)(read_only(points), triangles, origin, sums, budget.flag)
     for k in range(3):
-        moment = _summed(sums[k], len(triangles), -1 if looks.common < 0 else 1)
+        moment = _summed(sums[k], len(triangles))
         if moment is None:
             return None
         factor = 8 if k == 2 else 4
@@ -314,21 +321,26 @@ def _centroid_of(solid: Polyhedron, points: FloatArray, looks: Shells, budget: B
 
 
 def _area_of_mesh(solid: Mesh, budget: Budget) -> tuple[float, bool]:
+    triangles = read_only(solid.triangles)
+    if isinstance(solid, Polyhedron):
+        all_points, triangles = surface(solid, budget)
+        if len(all_points) > len(solid.vertices):
+            return area_of_cut(all_points, triangles, budget), False
     exponent = exponent_of(solid.vertices)
     points = shifted(solid.vertices, -exponent)
     if points is not None:
         sums = np.zeros((1, 3))
         with np.errstate(all="ignore"):
-            entry_of(sum_area)(read_only(points), read_only(solid.triangles), sums, budget.flag)
+            entry_of(sum_area)(read_only(points), triangles, sums, budget.flag)
             budget.check()
-            n = len(solid.triangles)
-            twice = _summed(sums[0], n, 1, n * LOST_TO_ROOTS)
+            n = len(triangles)
+            twice = _summed(sums[0], n, n * LOST_TO_ROOTS)
             half = None if twice is None else _rounded(twice[0] / 2, twice[1] / 2)
             result = None if half is None else float(np.ldexp(half, 2 * exponent))
         if result is not None and _is_scaled(result, exponent):
             return result, False
     budget.check()
-    return nearest_area(exact_faces(solid.vertices, solid.triangles)), True
+    return nearest_area(exact_faces(solid.vertices, triangles)), True
 
 
 MESH: Final = Measures(

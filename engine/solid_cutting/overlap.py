@@ -27,8 +27,7 @@ from engine.solid_cutting.overlap_batches import (
     pose_of,
     ratio_of,
 )
-from engine.solid_cutting.plane_cut import Points, plane_of
-from engine.solid_cutting.shells import outward
+from engine.solid_cutting.plane_cut import plane_of
 from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid, named
 from engine.solids.convexity import convexity
@@ -297,7 +296,7 @@ def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, b
         return 0.0
     if not is_ratio:
         return volume_of_cut(*common, budget, factor)
-    whole = Points(solid.vertices), outward(solid, budget)
+    whole = left.given.points, left.given.triangles
     parts = [volume_between(*each, budget, factor) for each in (common, whole)]
     other = _volume_within(rows, budget)
 

@@ -13,12 +13,13 @@ Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974, for e
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from engine.compiling.jit import entry_of
-from engine.predicates.rational import Number, nearest_pair, reduced, scaled_integers, sign_of
+from engine.predicates.rational import Number, cross, dot, minus, nearest_pair, reduced, scaled_integers, sign_of
 from engine.running.budget import Budget
 from engine.solid_cutting.face_cuts import cut_edges, find_sides, split_faces
 from engine.solids.mesh import first_equal
@@ -55,6 +56,15 @@ def plane_of(row: Sequence[Number]) -> Plane:
     return Plane(integers, read_only(np.array(scaled)), is_exact)
 
 
+def plane_through(values: FloatArray) -> Plane:
+    """Return the plane through three points (3, 3), or through a point and at a right angle to a vector (2, 3), exact,
+    its normal zero where there is none."""
+    numbers = scaled_integers([*values.ravel().tolist(), 1])
+    p, q, r, w = numbers[:3], numbers[3:6], numbers[6:-1], numbers[-1]
+    normal = tuple(q) if len(values) == 2 else cross(minus(q, p), minus(r, p))
+    return plane_of([*(x * w for x in normal), -dot(normal, tuple(p))])
+
+
 class Points:
     """The vertices of a solid, and those that cuts add; a point is its number.
 
@@ -76,6 +86,12 @@ class Points:
 
     def __len__(self) -> int:
         return self.n_given + len(self.high)
+
+    def copy(self) -> Points:
+        """Return the same points, to which others can be added."""
+        made = copy(self)
+        made._planes, made._places = self._planes.copy(), self._places.copy()
+        return made
 
     def rounded(self, numbers: IntArray | list[int]) -> FloatArray:
         """Return the nearest doubles (n, 3) of points."""
@@ -152,6 +168,16 @@ class Points:
                 high[k, axis], low[k, axis] = nearest_pair(value, w)
         self.high, self.low = np.concatenate([self.high, high]), np.concatenate([self.low, low])
 
+    def add_place(self, place: Place) -> int:
+        """Add a point at an exact place; return its number."""
+        number = len(self)
+        pairs = np.array([nearest_pair(x, place[3]) for x in place[:3]])
+        self._places[number] = place
+        self._edges = np.concatenate([self._edges, [[-1, -1]]])
+        self._plane_of = np.concatenate([self._plane_of, [-1]])
+        self.high, self.low = (np.concatenate([each, row[None]]) for each, row in zip((self.high, self.low), pairs.T))
+        return number
+
     def add_crossings(self, edges: IntArray, on_plane: IntArray, plane: Plane, budget: Budget) -> IntArray:
         """Add the crossings of edges (k, 2) with a plane, the first end inside; return their numbers. Crossings at one
         place get one number, that of a point of `on_plane` if there is one at that place."""
@@ -222,7 +248,7 @@ def cut_triangles(
         tips = np.stack([np.where(is_tip, p, a), np.where(is_tip, a, q), np.where(is_tip, b, r)], axis=1)
         quads = np.flatnonzero(~is_tip & (a != b))
         cut = np.concatenate([tips, np.stack([a[quads], r[quads], b[quads]], axis=1)])
-        has_sides = _are_different(cut)
+        has_sides = are_different(cut)
         return cut[has_sides], np.concatenate([mixed, mixed[quads]])[has_sides]
 
     beyond = triangles[:0], mixed[:0]
@@ -233,11 +259,11 @@ def cut_triangles(
     return Cut(whole, *pieces(is_one), chain[a != b], *beyond, np.column_stack([edges, new]))
 
 
-def _are_different(triangles: IntArray) -> BoolArray:
+def are_different(triangles: IntArray) -> BoolArray:
     """Return whether triangles name three points; others, where points at one place are one, have no boundary."""
     return (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
 
 
 def without_repeats(triangles: IntArray) -> IntArray:
     """Return the triangles that name three different points."""
-    return triangles[_are_different(triangles)]
+    return triangles[are_different(triangles)]

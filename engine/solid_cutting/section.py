@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Final, cast
 import numpy as np
 
 from engine.errors import InvalidArrayError, InvalidInputError, UnsupportedSolidError, ZeroNormalError
-from engine.predicates.rational import cross, dot, minus, scaled_integers, squared_length
+from engine.predicates.rational import cross, dot, squared_length
 from engine.running.budget import Budget, Cancel, current, polled
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import Area, Seen
 from engine.solid_cutting.cut_measures import area_of_section
 from engine.solid_cutting.exact_measures import nearest_root_over
-from engine.solid_cutting.plane_cut import Plane, plane_of
+from engine.solid_cutting.plane_cut import Plane, plane_of, plane_through
 from engine.solid_cutting.slices import slices_at
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid, named
@@ -169,7 +169,7 @@ def section(
     the plane moved along its normal by less than anything. Where a face lies in the plane it is in the section if the
     solid is on the side of the normal. What has no area, where the plane touches an edge or vertex, is left out.
 
-    Degenerate input: shells count by nesting, see `volume`; rings may touch themselves and each other.
+    Degenerate input: a polyhedron is even-odd, see `volume`; rings may touch themselves and each other.
 
     Accuracy: which rings there are, and their order, is exact; coordinates are the nearest doubles, so that a vertex
     may lie half a unit in the last place off the plane, and neighbours may round to one position.
@@ -253,13 +253,11 @@ def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], Flo
         )
     if normal is not None:
         raise InvalidInputError("normal goes with heights; leave it out", ("normal",))
-    numbers = scaled_integers([*values.ravel().tolist(), 1])
-    p, q, r, w = numbers[:3], numbers[3:6], numbers[6:-1], numbers[-1]
-    across = tuple(q) if len(values) == 2 else cross(minus(q, p), minus(r, p))
-    if not any(across):
+    plane = plane_through(values)
+    if not any(plane.integers[:3]):
         what = "the normal is zero" if len(values) == 2 else "the three points are on one line"
         raise ZeroNormalError(f"{what}; give another plane", ("planes",))
-    return [plane_of([*(x * w for x in across), -dot(across, tuple(p))])], None, _NO_HEIGHTS
+    return [plane], None, _NO_HEIGHTS
 
 
 def _areas_of(made: Any, budget: Budget) -> FloatArray:

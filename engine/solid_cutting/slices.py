@@ -21,9 +21,9 @@ from engine.compiling.jit import entry_of, kernel
 from engine.predicates.side import side_of_plane
 from engine.predicates.vectors import as_point3
 from engine.running.budget import Budget
+from engine.solid_cutting.boundary import Boundary, boundary
 from engine.solid_cutting.caps import Area, Ring, Seen, areas_of, oriented, rings_of, seen
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles
-from engine.solid_cutting.shells import outward, shells
 from engine.solids.mesh import Polyhedron
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, IntArray, read_only
 
@@ -142,25 +142,28 @@ def slices_at(
     body: Polyhedron, planes: list[Plane], axis: FloatArray | None, heights: FloatArray, budget: Budget
 ) -> list[Slice]:
     """Return the sections of a polyhedron by planes; axis: their common normal, if they are at heights along it."""
-    n = len(body.vertices)
-    if axis is not None and len(planes) > 1:
+    given, n = boundary(body, budget), len(body.vertices)
+    if axis is not None and len(planes) > 1 and len(given.points) == n:
         unique, first, places = np.unique(heights, return_index=True, return_inverse=True)
         ranks, is_on = np.empty(n, np.int64), np.empty(n, np.bool_)
         is_sure = entry_of(rank_vertices)(body.vertices, axis, read_only(unique), ranks, is_on, budget.flag)
         budget.check()
         if is_sure:
-            made = _swept(body, [planes[k] for k in first.tolist()], ranks, is_on, budget)
+            made = _swept(body, given, [planes[k] for k in first.tolist()], ranks, is_on, budget)
             return [made[k] for k in places.tolist()]
     made = []
     for plane in planes:
-        sides = Points(body.vertices).sides(plane, budget)
-        made += _swept(body, [plane], (sides > 0).astype(np.int64), sides == 0, budget)
+        sides = given.points.sides(plane, budget)
+        made += _swept(body, given, [plane], (sides > 0).astype(np.int64), sides == 0, budget)
     return made
 
 
-def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolArray, budget: Budget) -> list[Slice]:
-    """Return the sections by parallel planes, numbered along their normal. ranks, is_on: as for `rank_vertices`."""
-    faces, firsts = outward(body, budget), np.zeros(len(planes) + 2, np.int64)
+def _swept(
+    body: Polyhedron, given: Boundary, planes: list[Plane], ranks: IntArray, is_on: BoolArray, budget: Budget
+) -> list[Slice]:
+    """Return the sections by parallel planes, numbered along their normal, of a body whose boundary is `given`. ranks,
+    is_on: as for `rank_vertices`."""
+    faces, firsts = given.triangles, np.zeros(len(planes) + 2, np.int64)
     entry_of(sort_faces)(faces, ranks, True, firsts, firsts[:0], budget.flag)
     budget.check()
     np.cumsum(firsts, out=firsts)
@@ -169,10 +172,10 @@ def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolAr
     crossing = np.empty(n, np.int64)
     entry_of(sort_faces)(faces, ranks, False, firsts, crossing, budget.flag)
     budget.check()
-    across, is_open = _across(body, faces, budget), np.ones(len(planes), np.bool_)
+    across, is_open = _across(body, given, budget), np.ones(len(planes), np.bool_)
     shells_of: dict[int, list[Ring]] = defaultdict(list)
     holes_of: dict[int, list[Ring]] = defaultdict(list)
-    points = Points(body.vertices)
+    points = given.points.copy()
     if across is not None:
         is_open[:] = False
         cuts, ends, of = np.empty((n, 3), np.int64), np.empty(n // 3 + 1, np.int64), np.empty(n // 3 + 1, np.int64)
@@ -197,7 +200,7 @@ def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolAr
         some, holes = shells_of[number], holes_of[number]
         view = seen(points, plane)
         if is_open[number]:
-            made.append(_alone(body.vertices, faces[crossing[firsts[number] : firsts[number + 1]]], plane, budget))
+            made.append(_alone(given.points, faces[crossing[firsts[number] : firsts[number + 1]]], plane, budget))
         elif holes and len(some) > 1:
             made.append((view, plane, _nested(view, [*some, *holes], budget)))
         else:
@@ -205,17 +208,18 @@ def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolAr
     return made
 
 
-def _across(body: Polyhedron, faces: IntArray, budget: Budget) -> IntArray | None:
-    """Return the face beyond each side of each face (m, 3), cached with the body; None where an edge has more faces, or
-    faces meet elsewhere too."""
+def _across(body: Polyhedron, given: Boundary, budget: Budget) -> IntArray | None:
+    """Return the face beyond each side of each face (m, 3) of a boundary, cached with the body; None where an edge has
+    more faces, or faces as given meet elsewhere too."""
 
     def build() -> IntArray | None:
+        faces = given.triangles
         n, starts, ends = len(body.vertices), faces.ravel(), np.roll(faces, -1, axis=1).ravel()
         sides, turned = starts * n + ends, ends * n + starts
         order, turned_order = np.argsort(sides), np.argsort(turned)
         sides = sides[order]
         is_closed = (sides == turned[turned_order]).all() and (sides[1:] != sides[:-1]).all()
-        if shells(body, budget).touches or not is_closed or (starts == ends).any():
+        if given.touches or not is_closed:
             return None
         others = np.empty_like(order)
         others[turned_order] = order
@@ -225,12 +229,15 @@ def _across(body: Polyhedron, faces: IntArray, budget: Budget) -> IntArray | Non
     return across
 
 
-def _alone(vertices: FloatArray, faces: IntArray, plane: Plane, budget: Budget) -> Slice:
+def _alone(points: Points, faces: IntArray, plane: Plane, budget: Budget) -> Slice:
     """Return the section by a plane of the faces that cross it."""
-    used, local = np.unique(faces, return_inverse=True)
-    points = Points(vertices[used] if len(used) else vertices[:1])
+    if len(points) == points.n_given and len(faces):
+        used, local = np.unique(faces, return_inverse=True)
+        points, faces = Points(points.vertices[used]), local.reshape(-1, 3)
+    else:
+        points = points.copy()
     view = seen(points, plane)
-    chain = cut_triangles(points, local.reshape(-1, 3), plane, budget).chain
+    chain = cut_triangles(points, faces, plane, budget).chain
     return view, plane, _nested(view, rings_of(view, chain, budget), budget)
 
 

@@ -34,7 +34,7 @@ from engine.predicates.error_free import (
     two_prod,
     two_sum,
 )
-from engine.types import FlagArray, FloatArray, Int8Array, IntArray
+from engine.types import FlagArray, FloatArray, IntArray
 
 _TINY: Final = 2.0**-1000
 LOST_TO_ROOTS: Final = 2.0**-500
@@ -122,11 +122,8 @@ def certified(sums: FloatArray, whole: float, is_ratio: bool) -> float:
 
 
 @kernel
-def sum_volume(
-    vertices: FloatArray, triangles: IntArray, sides: Int8Array, z0: float, sums: FloatArray, flag: FlagArray
-) -> None:
-    """Add to sums[0] six times the volume, as `_add` does. sides: 1 or -1 by triangle, or empty for 1 throughout. z0:
-    where z is measured from."""
+def sum_volume(vertices: FloatArray, triangles: IntArray, z0: float, sums: FloatArray, flag: FlagArray) -> None:
+    """Add to sums[0] six times the volume, as `_add` does. z0: where z is measured from."""
     total = rest = all_sizes = 0.0
     for item in range(triangles.shape[0]):
         if item & _POLL == 0 and flag[0] != 0:
@@ -135,8 +132,6 @@ def sum_volume(
         h, low, size = _minor(vertices, a, b, c, 0, 1)
         sh, sl, z_size = _sum_of_three(vertices, a, b, c, 2, z0)
         h, low = dd_mul(h, low, sh, sl)
-        if sides.shape[0] > 0 and sides[item] < 0:
-            h, low = -h, -low
         total, lost = two_sum(total, h)
         rest += lost + low
         all_sizes += size * z_size
@@ -145,19 +140,18 @@ def sum_volume(
 
 @kernel
 def sum_moments(
-    vertices: FloatArray, triangles: IntArray, sides: Int8Array, origin: FloatArray, sums: FloatArray, flag: FlagArray
+    vertices: FloatArray, triangles: IntArray, origin: FloatArray, sums: FloatArray, flag: FlagArray
 ) -> None:
     """Add to sums[k], for k = 0, 1, 2, 24, 24 and 48 times the moments of the volume about the origin (3,), as `_add`
-    does. sides: as for `sum_volume`."""
+    does."""
     for item in range(triangles.shape[0]):
         if item & _POLL == 0 and flag[0] != 0:
             return
         a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
         h, low, size = _minor(vertices, a, b, c, 0, 1)
-        side = -1.0 if sides.shape[0] > 0 and sides[item] < 0 else 1.0
         for k in range(3):
             sh, sl, moment = _sum_of_squares(vertices, a, b, c, k, 2, origin)
-            sh, sl = dd_mul(side * h, side * low, sh, sl)
+            sh, sl = dd_mul(h, low, sh, sl)
             _add(sums, k, sh, sl, size * moment)
 
 

@@ -31,7 +31,7 @@ class VolumeRequest(Schema):
 class VolumeResponse(Schema):
     """Each the double nearest to the exact value."""
 
-    volume: Number = optional("Even-odd, shells by their nesting; left out in the plane and of a surface.")
+    volume: Number = optional("Even-odd; left out in the plane and of a surface.")
     area: Number = Field(description="In the plane of the solid, in space of its surface, every face as given.")
     centroid: Position = optional("Left out of what has no volume, or in the plane no area.")
     accuracy: Accuracy

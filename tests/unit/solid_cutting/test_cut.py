@@ -12,10 +12,9 @@ import pytest
 
 import engine
 from engine.running.budget import Budget
+from engine.solid_cutting.boundary import boundary
 from engine.solid_cutting.cut_measures import volume_in_fractions
 from engine.solid_cutting.ears import bridge_of
-from engine.solid_cutting.plane_cut import Points
-from engine.solid_cutting.shells import outward
 from tests.reference.cutting import cut_volume, nearest, points_of
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star, subdivided, turned
 
@@ -170,7 +169,7 @@ def test_what_is_inside_and_outside_several_planes_is_the_whole(seed: int) -> No
     assert outside == engine.cut(body, region, keep="outside")
     volumes = [volume_in_fractions(part._points, part._triangles) if part else 0 for part in (inside, outside)]
     with Budget(None) as budget:
-        assert sum(volumes) == volume_in_fractions(Points(body.vertices), outward(body, budget))
+        assert sum(volumes) == volume_in_fractions(*boundary(body, budget)[:2])
     assert bool(outside) is (volumes[1] > 0)
     if not outside:
         return

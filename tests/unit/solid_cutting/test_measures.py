@@ -10,7 +10,7 @@ import pytest
 
 import engine
 from engine.running.budget import Budget
-from engine.solid_cutting.shells import shells
+from engine.solid_cutting.boundary import boundary
 from engine.solids.convexity import star_side
 from tests.reference.cutting import moment, nearest, points_of, signed_volume
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
@@ -83,11 +83,13 @@ def test_stars_are_told_without_looking_for_crossings(monkeypatch: pytest.Monkey
     bent = engine.Polyhedron(np.where(np.arange(len(vertices))[:, None] == 8, -0.5 * vertices, vertices), faces)
     assert [star_side(each) for each in (*bodies, nested, bent)] == [-1, 1, 0, 0]
     assert engine.volume(nested) == nearest(signed_volume(points_of(vertices), faces) * Fraction(63, 64))
-    found = [shells(body, Budget(None)) for body in bodies]
-    monkeypatch.setattr("engine.solid_cutting.shells.star_side", lambda body: 0)
-    for body, (*_, common, n, touches) in zip(bodies, found):
-        copy = engine.Polyhedron(body.vertices, body.triangles)
-        assert shells(copy, Budget(None))[1:] == (common, n, touches)
+    found = [boundary(body, Budget(None)) for body in bodies]
+    monkeypatch.setattr("engine.solid_cutting.boundary.star_side", lambda body: 0)
+    for body, known in zip(bodies, found):
+        copy = boundary(engine.Polyhedron(body.vertices, body.triangles), Budget(None))
+        assert (copy.triangles == known.triangles).all()
+        assert not known.touches
+        assert not copy.touches
 
 
 def test_shells_in_a_common_edge_do_not_depend_on_the_order_of_faces() -> None:
