@@ -31,7 +31,7 @@ from engine.solid_cutting.conforming import Contacts, conformed, contacts_of
 from engine.solid_cutting.faults import Edges, are_flat, edges_of, shells_of, sign_of_volume
 from engine.solid_cutting.plane_cut import Place, Points, are_different, plane_through
 from engine.solids.convexity import convexity, star_side
-from engine.solids.mesh import Polyhedron
+from engine.solids.mesh import Mesh, Polyhedron
 from engine.types import BoolArray, IntArray, read_only
 
 
@@ -61,18 +61,23 @@ def boundary(solid: Polyhedron, budget: Budget) -> Boundary:
 
 
 def surface(solid: Polyhedron, budget: Budget) -> tuple[Points, IntArray]:
-    """Return points and triangles that make up the boundary of a polyhedron, turned either way. Faces may pass through
-    each other unless some lie on each other too. Raises: InvalidInputError."""
-    if not _is_star(solid):
-        contacts = _contacts(solid, budget)
-        if len(contacts.flush) or contacts.crossing is None:
-            made = boundary(solid, budget)
-            return made.points, made.triangles
-    return Points(solid.vertices), solid.triangles
+    """Return points and triangles that make up the boundary of a polyhedron, turned either way; cached with it. Faces
+    may pass through each other unless some lie on each other too. Raises: InvalidInputError."""
+
+    def build() -> tuple[Points, IntArray]:
+        is_star = convexity(solid) is not None or star_side(solid) != 0
+        contacts = None if is_star else _contacts(solid, budget)
+        if contacts is None or (contacts.crossing is not None and not len(contacts.flush)):
+            return points_of(solid), solid.triangles
+        made = boundary(solid, budget)
+        return made.points, made.triangles
+
+    return solid.prepared("surface", build, budget.check)
 
 
-def _is_star(solid: Polyhedron) -> bool:
-    return convexity(solid) is not None or star_side(solid) != 0
+def points_of(solid: Mesh) -> Points:
+    """Return the vertices of a mesh as points, cached with it and not to be changed."""
+    return solid.prepared("points", lambda: Points(solid.vertices))
 
 
 def _contacts(solid: Polyhedron, budget: Budget) -> Contacts:
@@ -84,7 +89,7 @@ def _contacts(solid: Polyhedron, budget: Budget) -> Contacts:
 
 
 def _boundary_of(solid: Polyhedron, budget: Budget) -> Boundary:
-    points, triangles = Points(solid.vertices), solid.triangles
+    points, triangles = points_of(solid), solid.triangles
     of = np.arange(len(triangles))
     certificate = convexity(solid)
     side = -star_side(solid) if certificate is None else 1 if certificate.is_outward else -1
@@ -99,6 +104,7 @@ def _boundary_of(solid: Polyhedron, budget: Budget) -> Boundary:
     triangles = triangles[of]
     edges, is_flat = edges_of(triangles), contacts.is_flat[of]
     if len(contacts.flush) or len(contacts.along) or (is_flat.any() and (edges.uses > 2).any()):
+        points = points.copy()
         triangles, of = conformed(points, solid.triangles, contacts, budget)
         edges, is_flat = edges_of(triangles), np.zeros(len(triangles), np.bool_)
     wholes = solid.triangles[of]

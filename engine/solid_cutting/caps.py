@@ -27,7 +27,7 @@ from engine.predicates.rational import largest_axis, sign_of
 from engine.running.budget import Budget
 from engine.solid_cutting.ears import bridge_of, clip_ears
 from engine.solid_cutting.face_cuts import find_turned, turn_rings
-from engine.solid_cutting.plane_cut import Plane, Points, without_repeats
+from engine.solid_cutting.plane_cut import Plane, Points, stops_of, without_repeats
 from engine.types import FloatArray, IntArray, read_only
 
 Ring = list[int]
@@ -248,26 +248,10 @@ def cap_of(view: Seen, chain: IntArray, budget: Budget) -> IntArray:
 def _split_at_contacts(view: Seen, chain: IntArray, budget: Budget) -> tuple[IntArray, IntArray]:
     """Return a chain of which each side is split at the points of others that lie on it, and flat triangles between
     the sides before and after: so that sides that lie on each other cancel."""
-    numbers = np.unique(chain)
-    places = view.doubles(numbers.tolist())
-    sides: list[tuple[int, int]] = []
-    joints: list[tuple[int, int, int]] = []
-    slack = 2.0**-40 * np.abs(places).max()
-    for start, end in chain.tolist():
-        budget.check()
-        a, b = view.doubles([start, end])
-        near = ((places >= np.minimum(a, b) - slack) & (places <= np.maximum(a, b) + slack)).all(axis=1)
-        off = np.abs((b[0] - a[0]) * (places[:, 1] - a[1]) - (b[1] - a[1]) * (places[:, 0] - a[0]))
-        near &= ~(off > 4.0 * slack * np.abs(b - a).sum() + slack * slack)
-        others = [k for k in numbers[near].tolist() if k not in (start, end) and view.turn(start, end, k) == 0]
-        if others:
-            p, q = view.exact(start), view.exact(end)
-            ahead = {k: sum((x - y) * (z - y) for x, y, z in zip(view.exact(k), p, q)) for k in others}
-            length = sum((z - y) ** 2 for y, z in zip(p, q))
-            others = sorted((k for k in others if 0 < ahead[k] < length), key=ahead.__getitem__)
-        stops = [start, *others, end]
-        sides += pairwise(stops)
-        joints += [(start, j, i) for i, j in pairwise(stops[1:])]
+    on = view.points.on_sides(np.unique(np.sort(chain, axis=1), axis=0), np.unique(chain), budget)
+    ways = [stops_of((start, end), on) for start, end in chain.tolist()]
+    sides = [pair for way in ways for pair in pairwise(way)]
+    joints = [(way[0], j, i) for way in ways for i, j in pairwise(way[1:])]
     return np.array(sides, np.int64), np.array(joints, np.int64).reshape(-1, 3)
 
 

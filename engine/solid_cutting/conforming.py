@@ -26,13 +26,12 @@ from engine.arrangement.arrange import arrange
 from engine.arrangement.nodes import NodeTable, float_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrangement.union_find import UnionFind
-from engine.bounding.box_grid import all_pairs_of_boxes
 from engine.polygon_clipping.planes import orientations
 from engine.predicates.rational import cross, reduced
 from engine.running.budget import Budget
 from engine.solid_cutting.caps import Seen, cap_of, seen
 from engine.solid_cutting.faults import crossings
-from engine.solid_cutting.plane_cut import Place, Plane, Points, are_different, plane_through
+from engine.solid_cutting.plane_cut import Plane, Points, are_different, plane_through, stops_of
 from engine.types import BoolArray, FloatArray, IntArray
 
 _NO_JUNCTIONS: Final = np.zeros((0, 3), np.int64)
@@ -123,7 +122,7 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     sides: IntArray = np.concatenate([faces[involved & is_left][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2),
                             np.array([side for _, own in cells for side in own], np.int64).reshape(-1, 2)])  # fmt: skip
     spots = np.concatenate([np.unique(faces[involved]), np.arange(n_given, len(points))])
-    on = _points_on(points, np.unique(np.sort(sides, axis=1), axis=0), spots, budget)
+    on = points.on_sides(np.unique(np.sort(sides, axis=1), axis=0), spots, budget)
     ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     n = len(points)
     is_cut = np.isin(ends[..., 0] * n + ends[..., 1], [low * n + high for low, high in on]).any(axis=1) & is_left
@@ -134,7 +133,7 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     made, origins = [faces[of]], [of]
     for face, own in cells:
         budget.check()
-        split = [pair for side in own for pair in pairwise(_stops(side, on))]
+        split = [pair for side in own for pair in pairwise(stops_of(side, on))]
         made.append(_filled(points, faces[face], split, budget))
         origins.append(np.full(len(made[-1]), face))
     return np.concatenate(made), np.concatenate(origins)
@@ -209,44 +208,6 @@ def _number_of(points: Points, nodes: NodeTable, node: int, view: Seen, plane: P
     if key not in places:
         places[key] = points.add_place(key)  # type: ignore[arg-type]
     return places[key]
-
-
-def _points_on(points: Points, sides: IntArray, spots: IntArray, budget: Budget) -> dict[tuple[int, int], list[int]]:
-    """Return, by side (k, 2), which of some points are in its interior, in their order from its first end on; sides
-    without any are left out."""
-    ends, at = points.rounded(sides.ravel()).reshape(-1, 2, 3), points.rounded(spots)
-    boxes = [np.concatenate([pick(ends, axis=1), at]) for pick in (np.min, np.max)]
-    pairs, n = all_pairs_of_boxes(boxes[0], boxes[1], budget), len(sides)
-    pairs = pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)] - np.array([0, n])
-    pairs = pairs[(sides[pairs[:, 0]] != spots[pairs[:, 1]][:, None]).all(axis=1)]
-    with np.errstate(all="ignore"):
-        along, away = ends[pairs[:, 0], 1] - ends[pairs[:, 0], 0], at[pairs[:, 1]] - ends[pairs[:, 0], 0]
-        reach = np.abs(along).max(axis=1, initial=0.0)
-        bound = 2.0**-48 * reach * (reach + points.size) + 2.0**-1000  # positions are off by 2^-53 of the largest
-        pairs = pairs[~(np.abs(np.cross(along, away)).max(axis=1, initial=0.0) > bound)]
-    on: dict[tuple[int, int], list[tuple[Fraction, int]]] = defaultdict(list)
-    for row, spot in pairs.tolist():
-        budget.check()
-        (start, end), number = sides[row].tolist(), int(spots[spot])
-        share = _share(*map(points.exact, (start, end, number)))
-        if share is not None and 0 < share < 1:
-            on[start, end].append((share, number))
-    return {side: [number for _, number in sorted(own)] for side, own in on.items()}
-
-
-def _share(start: Place, end: Place, at: Place) -> Fraction | None:
-    """Return t where a place is start + t (end - start), None if it is not on that line."""
-    p, q, r = ([Fraction(x, place[3]) for x in place[:3]] for place in (start, end, at))
-    u, v = [b - a for a, b in zip(p, q)], [b - a for a, b in zip(p, r)]
-    axis = next(k for k in range(3) if u[k])
-    share = v[axis] / u[axis]
-    return share if all(share * x == y for x, y in zip(u, v)) else None
-
-
-def _stops(side: tuple[int, int], on: dict[tuple[int, int], list[int]]) -> list[int]:
-    start, end = side
-    between = on.get((min(side), max(side)), [])
-    return [start, *(between if start < end else between[::-1]), end]
 
 
 def _filled(points: Points, face: IntArray, sides: Sides, budget: Budget) -> IntArray:

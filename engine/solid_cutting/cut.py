@@ -15,7 +15,7 @@ from engine.running.budget import Budget, Cancel, current
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.boundary import Boundary, boundary
 from engine.solid_cutting.caps import cap_of, seen
-from engine.solid_cutting.cut_measures import area_of_cut, volume_of_cut
+from engine.solid_cutting.cut_measures import nearest_area, nearest_volume
 from engine.solid_cutting.face_cuts import find_shapes
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles, plane_of
 from engine.solid_cutting.section import as_polyhedron
@@ -99,7 +99,7 @@ class CutSolid(ByValue):
     def _measured(self, budget: Budget) -> tuple[float, float]:
         if self._measures is None and self._points is not None:
             some = self._points, self._triangles, budget
-            object.__setattr__(self, "_measures", (volume_of_cut(*some), area_of_cut(*some)))
+            object.__setattr__(self, "_measures", (nearest_volume(*some)[0], nearest_area(*some)[0]))
         return self._measures or (0.0, 0.0)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -166,16 +166,16 @@ def cut(
     The result is the closure of what the open interiors have in common, without flat parts; outside, of the open
     interior without the region. A vertex on a plane counts as not in that, an edge that ends there is cut at it.
 
-    Degenerate input: where nothing is left, no vertices and faces. A polyhedron is even-odd, see `volume`: of faces that
-    lie on each other what is no boundary is left out, and the rest is cut where their edges cross, as are the faces
-    beside it, so that every vertex is one of all faces that meet there.
+    Degenerate input: where nothing is left, no vertices and faces. A polyhedron is even-odd, see `volume`: of
+    faces that lie on each other what is no boundary is left out, and the rest is cut where their edges cross, as are
+    the faces beside it, so that every vertex is one of all faces that meet there.
 
     Accuracy: which faces there are, and that they close, is exact: every side of a face is used as often in one
     direction as in the other, by index and so by position. Coordinates are the nearest doubles. Rounding may flatten
     faces thinner than that or turn them over: `collapsed` and `folded` name them. `volume` and `area` are those of the
     exact result.
 
-    Cost: some 0.15 us a face for one plane; small meshes with a box 2 us a face inside, 6 outside; and what `volume`
+    Cost: 0.15 us a face for one plane; small meshes with a box 2 us a face inside, 6 outside; and what `volume`
     computes once.
 
     References

@@ -1,4 +1,4 @@
-"""Volumes and areas of what planes leave, each the double nearest to the exact value for the input.
+"""Volumes, areas and centroids of meshes of points, each the double nearest to the exact value for the input.
 
 Faces of given vertices are summed by the kernels. Corners that are cut points are rational, with denominators of their
 own, so a sum of them as one fraction would grow with their number: they are rounded to a number of bits, in integers,
@@ -29,15 +29,15 @@ from engine.running.budget import Budget
 from engine.solid_cutting.caps import Area, Seen
 from engine.solid_cutting.exact_measures import (
     ExactMesh,
+    area_in_roots,
     exact_centroid,
     exact_mesh,
     exact_volume,
-    nearest_area,
     nearest_root_over,
 )
 from engine.solid_cutting.plane_cut import Plane, Points
-from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_volume
-from engine.types import IntArray, read_only
+from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
+from engine.types import FloatArray, IntArray, read_only
 
 _BITS: Final = (80, 128, 512, 2048)
 """Bits of a coordinate that are tried: to the first, points are known without their fractions (`plane_cut.py`)."""
@@ -87,10 +87,13 @@ def _parted(points: Points, triangles: IntArray) -> tuple[IntArray, IntArray]:
     return read_only(triangles[~is_new]), triangles[is_new]
 
 
-def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: Fraction = Fraction(1)) -> float:
-    """Return the double nearest to factor times the volume within a closed mesh of points, whose faces look outward."""
+def nearest_volume(
+    points: Points, triangles: IntArray, budget: Budget, factor: Fraction = Fraction(1)
+) -> tuple[float, bool]:
+    """Return the double nearest to factor times the volume within a closed mesh of points, whose faces look outward,
+    and whether fractions decided."""
     value = narrowed(volume_between(points, triangles, budget, factor))
-    return nearest_float(factor * volume_in_fractions(points, triangles)) if value is None else value
+    return (nearest_float(factor * volume_in_fractions(points, triangles)), True) if value is None else (value, False)
 
 
 def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: Fraction) -> Ends:
@@ -127,9 +130,25 @@ def volume_in_fractions(points: Points, triangles: IntArray) -> Fraction:
     return exact_volume(_as_fractions(points, triangles)) if len(triangles) else Fraction(0)
 
 
-def centroid_in_fractions(points: Points, triangles: IntArray) -> list[Fraction]:
-    """Return the exact centroid of what a closed mesh of points encloses. Raises: EmptyGeometryError."""
-    return exact_centroid(_as_fractions(points, triangles))
+def nearest_centroid(points: Points, triangles: IntArray, budget: Budget) -> tuple[FloatArray, bool]:
+    """Return the doubles nearest to the centroid of what a closed mesh of points encloses, and whether fractions
+    decided. Raises: EmptyGeometryError."""
+    given, others = _parted(points, triangles)
+    low, high = volume_between(points, triangles, budget, Fraction(1))(_BITS[0]) if len(given) else (0, 0)
+    if low > 0 and not len(others):
+        sums, origin = np.zeros((3, 3)), read_only(points.vertices[given[0, 0]].copy())
+        with np.errstate(all="ignore"):
+            entry_of(sum_moments)(points.vertices, given, origin, sums, budget.flag)
+        budget.check()
+        made: list[float | None] = []
+        for k, factor in enumerate((24, 24, 48)):
+            moment, off = Fraction(sums[k, 0]) + Fraction(sums[k, 1]), Fraction(bound_of(float(sums[k, 2]), len(given)))
+            at = Fraction(float(origin[k]))
+            ends = [[at + (moment + way * off) / (factor * v) for v in (low, high)] for way in (-1, 1)]
+            made.append(narrowed(lambda _, ends=ends: (min(ends[0]), max(ends[1]))))  # type: ignore[misc]
+        if None not in made:
+            return np.array(made), False
+    return np.array([nearest_float(x) for x in exact_centroid(_as_fractions(points, triangles))]), True
 
 
 def _as_fractions(points: Points, triangles: IntArray) -> ExactMesh:
@@ -138,8 +157,8 @@ def _as_fractions(points: Points, triangles: IntArray) -> ExactMesh:
     return exact_mesh([[Fraction(x, p[3]) for x in p[:3]] for p in places], map(tuple, local.reshape(-1, 3).tolist()))
 
 
-def area_of_cut(points: Points, triangles: IntArray, budget: Budget) -> float:
-    """Return the area of triangles of points."""
+def nearest_area(points: Points, triangles: IntArray, budget: Budget) -> tuple[float, bool]:
+    """Return the double nearest to the area of triangles of points, and whether fractions decided."""
     given, others = _parted(points, triangles)
     sums = np.zeros((1, 3))
     with np.errstate(all="ignore"):
@@ -163,7 +182,7 @@ def area_of_cut(points: Points, triangles: IntArray, budget: Budget) -> float:
         return middle - width, middle + width
 
     value = narrowed(ends_of)
-    return nearest_area(_as_fractions(points, triangles)) if value is None else value
+    return (area_in_roots(_as_fractions(points, triangles)), True) if value is None else (value, False)
 
 
 def area_of_section(view: Seen, plane: Plane, area: Area, budget: Budget) -> float:

@@ -92,7 +92,7 @@ def _cross(u: Sequence[int], v: Sequence[int]) -> int:
     return u[0] * v[1] - u[1] * v[0]
 
 
-def nearest_area(mesh: ExactMesh) -> float:
+def area_in_roots(mesh: ExactMesh) -> float:
     """Return the double nearest to the area of the triangles of a mesh of space."""
     squares = []
     for i, j, k in polled(mesh.faces):
@@ -248,7 +248,7 @@ def _of_convex(solid: Convex, budget: Budget, what: str) -> tuple[Any, bool]:
     if mesh is None:
         return 0.0, True
     if what == "area" and solid.dimension == 3:
-        return nearest_area(mesh), True
+        return area_in_roots(mesh), True
     return nearest_float(exact_volume(mesh)), True
 
 
@@ -276,7 +276,7 @@ def _as_polygon(solid: Triangle, what: str, budget: Budget) -> tuple[Any, bool]:
         return (_area_of_rings if what == "area" else _centroid_of_rings)(rings, budget)
     mesh = exact_mesh(solid.vertices.tolist(), [(0, 1, 2)])
     if what == "area":
-        return nearest_area(mesh), True
+        return area_in_roots(mesh), True
     raise WrongDimensionError("a triangle of space has no volume, so no centroid; average its vertices", ("solid",))
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
+from engine.bounding.box_grid import pairs_of_boxes
 from engine.collision.codes import DISJOINT, TOUCHING
 from engine.collision.triangles import collide_triangles
 from engine.compiling.jit import entry_of
@@ -21,6 +21,7 @@ from engine.predicates.rational import cross, scaled_integers, sign_of
 from engine.running.budget import Budget, polled
 from engine.solid_cutting.exact_measures import exact_faces, exact_volume
 from engine.solid_cutting.face_cuts import find_candidates
+from engine.solid_cutting.plane_cut import Points
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
@@ -75,23 +76,11 @@ def are_flat(points: FloatArray, faces: IntArray, budget: Budget) -> Any:
 
 
 def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
-    """Return the T-junctions (k, 2) of open edges `ends` (n, 2): an edge, and a vertex of another one that lies exactly
+    """Return the T-junctions (k, 3) of open edges `ends` (n, 2): an edge, and a vertex of another one that lies exactly
     in its interior; vertices of one edge in their order along it."""
-    vertices = np.unique(ends)
-    corners = np.concatenate([points[ends], points[vertices][:, None].repeat(2, axis=1)])
-    n = len(ends)
-    pairs = all_pairs_of_boxes(corners.min(axis=1), corners.max(axis=1), budget) if len(ends) else np.zeros((0, 2), int)
-    pairs = pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)]
-    edge, vertex = ends[pairs[:, 0]], vertices[pairs[:, 1] - n]
-    free = (edge != vertex[:, None]).all(axis=1)
-    edge, vertex = edge[free], vertex[free]
-    segments, spots = points[np.column_stack([edge, edge[:, 1]])], points[np.column_stack([vertex] * 3)]
-    met = np.asarray(collide_triangles(segments, spots, deadline=budget.left(), cancel=budget.cancel)) != DISJOINT
-    rows = np.column_stack([edge[met], vertex[met]])
-    start, end, at = points[rows].transpose(1, 0, 2)
-    axis = np.argmax(start != end, axis=1)[:, None]  # on one line a coordinate that differs is different everywhere
-    start, end, at = (np.take_along_axis(each, axis, axis=1)[:, 0] for each in (start, end, at))
-    return rows[np.lexsort((np.where(start < end, at, -at), rows[:, 1], rows[:, 0]))]
+    on = Points(points).on_sides(ends, np.unique(ends), budget) if len(ends) else {}
+    rows = [(*side, number) for side in sorted(on) for number in on[side]]
+    return np.array(rows, np.int64).reshape(-1, 3)
 
 
 def shells_of(edges: Edges, budget: Budget) -> list[IntArray]:

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-from math import isfinite
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
-import numpy as np
-
-from engine.compiling.jit import entry_of
-from engine.errors import NotRepresentableError, WrongDimensionError
-from engine.predicates.rational import SMALLEST_NORMAL, exponent_of, nearest_float, shifted
+from engine.errors import WrongDimensionError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
-from engine.solid_cutting.boundary import boundary, surface
-from engine.solid_cutting.cut_measures import area_of_cut, centroid_in_fractions, volume_of_cut
-from engine.solid_cutting.exact_measures import Measures, exact_centroid, exact_faces, exact_volume, nearest_area
-from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
+from engine.solid_cutting.boundary import boundary, points_of, surface
+from engine.solid_cutting.cut_measures import nearest_area, nearest_centroid, nearest_volume
+from engine.solid_cutting.exact_measures import Measures
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh, Polyhedron
 from engine.solids.registry import Where, refused, row_of
 from engine.solids.shapes import read_argument
-from engine.types import Accuracy, FloatArray, IntArray, read_only
-
-T = TypeVar("T")
+from engine.types import Accuracy, FloatArray
 
 
 def volume(
@@ -234,118 +225,21 @@ def measure(solid: Solid, what: str, budget: Budget, where: Where = ("solid",)) 
     return method(solid, budget)
 
 
-def _of_mesh(solid: Polyhedron, budget: Budget, what: str) -> tuple[Any, bool]:
-    """Return the volume or centroid (`what`) of a polyhedron, and whether integers decided: not where the bound on the
-    kernels' sums proves the rounding."""
+def _volume_of_mesh(solid: Polyhedron, budget: Budget) -> tuple[float, bool]:
     given = boundary(solid, budget)
-    triangles = given.triangles
-    if len(given.points) > len(solid.vertices):
-        if what == "volume":
-            return volume_of_cut(given.points, triangles, budget), False
-        return np.array([nearest_float(x) for x in centroid_in_fractions(given.points, triangles)]), True
-    exponent = exponent_of(solid.vertices)
-    points = shifted(solid.vertices, -exponent)
-    if points is not None and len(triangles):
-        with np.errstate(all="ignore"):
-            value = (_volume_of if what == "volume" else _centroid_of)(points, triangles, budget)
-            result = None if value is None else np.ldexp(value, 3 * exponent if what == "volume" else exponent)
-        budget.check()
-        if result is not None and _is_scaled(result, exponent):
-            return (float(result) if what == "volume" else result), False
-    budget.check()
-    mesh = exact_faces(solid.vertices, triangles)
-    if what == "volume":
-        return nearest_float(exact_volume(mesh)), True
-    return np.array([nearest_float(x) for x in exact_centroid(mesh)]), True
-
-
-def _is_scaled(result: Any, exponent: int) -> bool:
-    """Return whether `result`, already multiplied by 2^exponent, is proven not to have been rounded by that: the
-    exponent is 0, or all its numbers are normal and finite (a zero may have underflowed: False)."""
-    sizes = np.abs(result)
-    return bool(exponent == 0 or ((sizes > SMALLEST_NORMAL) & (sizes < np.inf)).all())
-
-
-def _six_volumes(
-    points: FloatArray, triangles: IntArray, z0: float, budget: Budget
-) -> tuple[Fraction, Fraction] | None:
-    """Return six times the volume, for z measured from z0, and a bound on its error; None where a sum overflows."""
-    sums = np.zeros((1, 3))
-    entry_of(sum_volume)(read_only(points), triangles, z0, sums, budget.flag)
-    return _summed(sums[0], len(triangles))
-
-
-def _summed(sums: FloatArray, n: int, more: float = 0.0) -> tuple[Fraction, Fraction] | None:
-    """Return a sum of n terms, given as (high part, low part, sum of sizes), exactly, and a bound on its
-    error, to which `more` is added."""
-    h, low, size = sums.tolist()
-    bound = bound_of(size, n) + more
-    if not isfinite(h + low + bound):
-        return None
-    return Fraction(h) + Fraction(low), Fraction(bound)
-
-
-def _rounded(value: Fraction, error: Fraction) -> float | None:
-    """Return the double to which value - error and value + error both round, None if they differ."""
-    try:
-        low, high = nearest_float(value - error), nearest_float(value + error)
-    except NotRepresentableError:
-        return None
-    return low if low == high else None
-
-
-def _volume_of(points: FloatArray, triangles: IntArray, budget: Budget) -> float | None:
-    six = _six_volumes(points, triangles, float(points[triangles[0, 0], 2]), budget)
-    return None if six is None else _rounded(six[0] / 6, six[1] / 6)
-
-
-def _centroid_of(points: FloatArray, triangles: IntArray, budget: Budget) -> FloatArray | None:
-    origin = read_only(points[triangles[0, 0]].copy())
-    six = _six_volumes(points, triangles, float(origin[2]), budget)
-    if six is None or not six[1] < six[0]:
-        return None
-    (v, v_bound), sums, made = six, np.zeros((3, 3)), []
-    entry_of(sum_moments)(read_only(points), triangles, origin, sums, budget.flag)
-    for k in range(3):
-        moment = _summed(sums[k], len(triangles))
-        if moment is None:
-            return None
-        factor = 8 if k == 2 else 4
-        share = moment[0] / (factor * v)
-        error = (moment[1] + abs(share) * factor * v_bound) / (factor * (v - v_bound))
-        value = _rounded(share + Fraction(float(origin[k])), error)
-        if value is None:
-            return None
-        made.append(value)
-    return np.array(made)
+    return nearest_volume(given.points, given.triangles, budget)
 
 
 def _area_of_mesh(solid: Mesh, budget: Budget) -> tuple[float, bool]:
-    triangles = read_only(solid.triangles)
-    if isinstance(solid, Polyhedron):
-        all_points, triangles = surface(solid, budget)
-        if len(all_points) > len(solid.vertices):
-            return area_of_cut(all_points, triangles, budget), False
-    exponent = exponent_of(solid.vertices)
-    points = shifted(solid.vertices, -exponent)
-    if points is not None:
-        sums = np.zeros((1, 3))
-        with np.errstate(all="ignore"):
-            entry_of(sum_area)(read_only(points), triangles, sums, budget.flag)
-            budget.check()
-            n = len(triangles)
-            twice = _summed(sums[0], n, n * LOST_TO_ROOTS)
-            half = None if twice is None else _rounded(twice[0] / 2, twice[1] / 2)
-            result = None if half is None else float(np.ldexp(half, 2 * exponent))
-        if result is not None and _is_scaled(result, exponent):
-            return result, False
-    budget.check()
-    return nearest_area(exact_faces(solid.vertices, triangles)), True
+    made = surface(solid, budget) if isinstance(solid, Polyhedron) else (points_of(solid), solid.triangles)
+    return nearest_area(*made, budget)
 
 
-MESH: Final = Measures(
-    lambda solid, budget: _of_mesh(solid, budget, "volume"), _area_of_mesh,
-    lambda solid, budget: _of_mesh(solid, budget, "centroid"),
-)  # fmt: skip
+def _centroid_of_mesh(solid: Polyhedron, budget: Budget) -> tuple[FloatArray, bool]:
+    given = boundary(solid, budget)
+    return nearest_centroid(given.points, given.triangles, budget)
+
+
+MESH: Final = Measures(_volume_of_mesh, _area_of_mesh, _centroid_of_mesh)
 SURFACE: Final = Measures(area=_area_of_mesh)
 """Cells of the table of solids (`engine/registry.py`)."""

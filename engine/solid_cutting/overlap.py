@@ -16,7 +16,7 @@ from engine.predicates.rational import Number, determinant, nearest_float, scale
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.cut import cut_by_planes
-from engine.solid_cutting.cut_measures import narrowed, volume_between, volume_in_fractions, volume_of_cut
+from engine.solid_cutting.cut_measures import narrowed, nearest_volume, volume_between, volume_in_fractions
 from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces, volume_of_boxes
 from engine.solid_cutting.overlap_batches import (
     check_same_length,
@@ -295,7 +295,7 @@ def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, b
     if not len(left.triangles):
         return 0.0
     if not is_ratio:
-        return volume_of_cut(*common, budget, factor)
+        return nearest_volume(*common, budget, factor)[0]
     whole = left.given.points, left.given.triangles
     parts = [volume_between(*each, budget, factor) for each in (common, whole)]
     other = _volume_within(rows, budget)

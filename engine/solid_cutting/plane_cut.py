@@ -12,14 +12,27 @@ Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974, for e
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from copy import copy
+from fractions import Fraction
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from engine.bounding.box_grid import all_pairs_of_boxes
 from engine.compiling.jit import entry_of
-from engine.predicates.rational import Number, cross, dot, minus, nearest_pair, reduced, scaled_integers, sign_of
+from engine.predicates.rational import (
+    Number,
+    cross,
+    dot,
+    largest_axis,
+    minus,
+    nearest_pair,
+    reduced,
+    scaled_integers,
+    sign_of,
+)
 from engine.running.budget import Budget
 from engine.solid_cutting.face_cuts import cut_edges, find_sides, split_faces
 from engine.solids.mesh import first_equal
@@ -178,6 +191,28 @@ class Points:
         self.high, self.low = (np.concatenate([each, row[None]]) for each, row in zip((self.high, self.low), pairs.T))
         return number
 
+    def on_sides(self, sides: IntArray, spots: IntArray, budget: Budget) -> dict[tuple[int, int], list[int]]:
+        """Return, by side (k, 2), which points of `spots` are in its interior, in their order from its first end on;
+        sides without any are left out."""
+        ends, at = self.rounded(sides.ravel()).reshape(-1, 2, 3), self.rounded(spots)
+        low, high = (np.concatenate([pick(ends, axis=1), at]) for pick in (np.min, np.max))
+        pairs, n = all_pairs_of_boxes(low, high, budget), len(sides)
+        pairs = pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)] - np.array([0, n])
+        pairs = pairs[(sides[pairs[:, 0]] != spots[pairs[:, 1]][:, None]).all(axis=1)]
+        with np.errstate(all="ignore"):  # positions are off by 2^-53 of the largest
+            along, away = ends[pairs[:, 0], 1] - ends[pairs[:, 0], 0], at[pairs[:, 1]] - ends[pairs[:, 0], 0]
+            reach = np.abs(along).max(axis=1, initial=0.0)
+            bound = 2.0**-48 * reach * (reach + self.size) + 2.0**-1000
+            pairs = pairs[~(np.abs(np.cross(along, away)).max(axis=1, initial=0.0) > bound)]
+        on: dict[tuple[int, int], list[tuple[Fraction, int]]] = defaultdict(list)
+        for row, spot in pairs.tolist():
+            budget.check()
+            (start, end), number = sides[row].tolist(), int(spots[spot])
+            share = _share(*map(self.exact, (start, end, number)))
+            if share is not None and 0 < share < 1:
+                on[start, end].append((share, number))
+        return {side: [number for _, number in sorted(own)] for side, own in on.items()}
+
     def add_crossings(self, edges: IntArray, on_plane: IntArray, plane: Plane, budget: Budget) -> IntArray:
         """Add the crossings of edges (k, 2) with a plane, the first end inside; return their numbers. Crossings at one
         place get one number, that of a point of `on_plane` if there is one at that place."""
@@ -193,6 +228,23 @@ class Points:
                 if self.exact(first + k) == self.exact(other):
                     numbers[k] = other
         return numbers
+
+
+def stops_of(side: tuple[int, int], on: dict[tuple[int, int], list[int]]) -> list[int]:
+    """Return the points of a side from its start to its end; on: those in its interior, as `Points.on_sides` gives them
+    for sides whose first end has the lower number."""
+    start, end = side
+    between = on.get((min(side), max(side)), [])
+    return [start, *(between if start < end else between[::-1]), end]
+
+
+def _share(start: Place, end: Place, at: Place) -> Fraction | None:
+    """Return t where a place is start + t (end - start), None if it is not on that line."""
+    p, q, r = ([Fraction(x, place[3]) for x in place[:3]] for place in (start, end, at))
+    along, away = [b - a for a, b in zip(p, q)], [b - a for a, b in zip(p, r)]
+    axis = largest_axis(along)
+    share = away[axis] / (along[axis] or 1)
+    return share if all(share * x == y for x, y in zip(along, away)) else None
 
 
 def value_at(plane: Plane, place: Place) -> int:
