@@ -53,6 +53,11 @@ class Boundary(NamedTuple):
     wholes: IntArray
     touches: bool
 
+    @property
+    def are_whole(self) -> BoolArray:
+        """Whether each triangle is all of one of the solid (m,)."""
+        return np.asarray((self.triangles == self.wholes).all(axis=1))
+
 
 def boundary(solid: Polyhedron, budget: Budget) -> Boundary:
     """Return the boundary of a polyhedron, cached with it. Raises: InvalidInputError for faces that pass through each
@@ -109,8 +114,7 @@ def _boundary_of(solid: Polyhedron, budget: Budget) -> Boundary:
         edges, is_flat = edges_of(triangles), np.zeros(len(triangles), np.bool_)
     wholes = solid.triangles[of]
     if len(triangles):
-        is_turned = _looks(solid, points, triangles, edges, is_flat, wholes, budget)
-        turns = is_turned[:, None]
+        turns = _looks(solid, points, triangles, edges, is_flat, wholes, budget)[:, None]
         triangles, wholes = (np.where(turns, rows[:, ::-1], rows) for rows in (triangles, wholes))
     return Boundary(points, read_only(triangles), read_only(of), read_only(wholes), contacts.touches)
 

@@ -117,8 +117,11 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     n_given = len(points)
     for group, edges in _planes_of(faces, contacts):
         budget.check()
-        cells += _cells(points, faces, group, edges, places, budget)
         is_left[group] = False
+        if not edges and len(np.unique(np.sort(faces[group], axis=1), axis=0)) == 1:  # one triangle again and again
+            is_left[group[0]] = len(group) % 2 == 1
+        else:
+            cells += _cells(points, faces, group, edges, places, budget)
     sides: IntArray = np.concatenate([faces[involved & is_left][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2),
                             np.array([side for _, own in cells for side in own], np.int64).reshape(-1, 2)])  # fmt: skip
     spots = np.concatenate([np.unique(faces[involved]), np.arange(n_given, len(points))])

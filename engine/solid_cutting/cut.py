@@ -242,7 +242,7 @@ def cut_by_planes(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Lef
     """Return what is inside all planes of a polyhedron, closed."""
     given = boundary(solid, budget)
     points, triangles, origins = given.points.copy(), given.triangles, np.arange(len(given.of))
-    is_whole = np.ones(len(triangles), np.bool_)
+    is_whole = given.are_whole
     for number, plane in enumerate(planes):
         budget.check()
         sides = points.sides(plane, budget)
@@ -272,7 +272,7 @@ def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     given, planes = boundary(solid, budget), [plane.reversed for plane in planes]
     points, triangles, origins = given.points.copy(), given.triangles, np.arange(len(given.of))
     if not is_met:
-        return Left(given, points, triangles, origins, np.ones(len(triangles), np.bool_), planes)
+        return Left(given, points, triangles, origins, given.are_whole, planes)
     parts, splits = [], [_NONE]
     for number, plane in enumerate(planes):
         budget.check()
@@ -290,7 +290,7 @@ def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     taken, of = (np.concatenate(each) for each in zip(*parts))
     taken, rows = _with_splits(taken, np.concatenate(splits), budget)
     taken, of = np.concatenate([taken, triangles[is_cap][:, ::-1]]), np.concatenate([of[rows], origins[is_cap]])
-    is_whole = (of >= 0) & (taken == given.triangles[np.maximum(of, 0)]).all(axis=1)
+    is_whole = (of >= 0) & (taken == given.wholes[np.maximum(of, 0)]).all(axis=1)
     return Left(given, points, taken, of, is_whole, planes)
 
 
