@@ -105,12 +105,15 @@ def _boundary_of(solid: Polyhedron, budget: Budget) -> Boundary:
     contacts = _contacts(solid, budget)
     if contacts.crossing is not None:
         raise _crossing(solid, *contacts.crossing)
+    budget.check()
     of = np.flatnonzero(are_different(triangles))
     triangles = triangles[of]
     edges, is_flat = edges_of(triangles), contacts.is_flat[of]
     if len(contacts.flush) or len(contacts.along) or (is_flat.any() and (edges.uses > 2).any()):
         points = points.copy()
+        budget.check()
         triangles, of = conformed(points, solid.triangles, contacts, budget)
+        budget.check()
         edges, is_flat = edges_of(triangles), np.zeros(len(triangles), np.bool_)
     wholes = solid.triangles[of]
     if len(triangles):

@@ -28,7 +28,7 @@ from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrangement.union_find import UnionFind
 from engine.polygon_clipping.planes import orientations
 from engine.predicates.rational import cross, reduced
-from engine.running.budget import Budget
+from engine.running.budget import Budget, polled
 from engine.solid_cutting.caps import Seen, cap_of, seen
 from engine.solid_cutting.faults import crossings
 from engine.solid_cutting.plane_cut import Plane, Points, are_different, plane_through, stops_of
@@ -61,11 +61,11 @@ def contacts_of(points: FloatArray, faces: IntArray, is_flat: BoolArray, budget:
     """Return how triangles (m, 3) of points meet."""
     pairs = crossings(points, faces, np.flatnonzero(~is_flat), _NO_JUNCTIONS, budget)
     corners = points[faces[pairs]]  # (k, 2, 3, 3): pair, face, corner, axis
-    budget.check()
     sides = np.zeros((len(pairs), 2, 3), np.int8)
     for k in range(2):
         a, b, c = (corners[:, 1 - k, corner] for corner in range(3))
         for j in range(3):
+            budget.check()
             sides[:, k, j] = orientations(a, b, c, corners[:, k, j])
     is_flush = (sides == 0).all(axis=(1, 2))
     straddles = (sides.min(axis=2) < 0) & (sides.max(axis=2) > 0)
@@ -112,7 +112,8 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     involved = np.zeros(len(faces), np.bool_)
     involved[np.concatenate([contacts.flush.ravel(), contacts.along[:, [0, 3]].ravel()])] = True
     involved |= contacts.is_flat
-    places = {reduced(points.exact(number)): number for number in np.unique(faces[involved]).tolist()}
+    budget.check()
+    places = {reduced(points.exact(number)): number for number in polled(np.unique(faces[involved]).tolist())}
     cells: list[tuple[int, Sides]] = []
     n_given = len(points)
     for group, edges in _planes_of(faces, contacts):
