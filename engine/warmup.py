@@ -22,7 +22,7 @@ from engine.compiling.kernel_cache import expect_compiling, warn_of_compiling
 from engine.containment.locate import locate
 from engine.containment.methods.rational_locate import rational_location
 from engine.containment.posed_locators import posed_locator
-from engine.distance.clearance import clearance
+from engine.distance.clearance import clearance, clearance_poses
 from engine.distance.distances import distances
 from engine.errors import InvalidInputError
 from engine.layers.geojson import EVERY, collection_of, mixed_of
@@ -305,6 +305,7 @@ def _warm_bounds() -> None:
                 bounds(solid)
     for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), _cube(5.0)):
         clearance(body, Sphere([3, 0, 0], 1))
+    clearance_poses(_cube(), _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
     collide_scene([Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1)], gap=2.0)
     orientations(*np.zeros((4, 1, 3)))  # of meshes that are inspected
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
-from engine.compiling.jit import kernel, merged
+from engine.compiling.jit import entry_of, kernel, merged
 from engine.predicates.vectors import cross, length, minus
 from engine.solids.base import Solid
 from engine.solids.convexity import convexity
 from engine.solids.mesh import Polyhedron
 from engine.solids.primitives import Aabb, Sphere
-from engine.types import FloatArray, IntArray, Point3
+from engine.types import FloatArray, IntArray, Point3, read_only
 
 MOST_FACES = 1 << 16
 """Most triangles of a polyhedron that is tested for convexity: the test takes milliseconds and mostly fails."""
@@ -43,6 +43,7 @@ WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
 axis."""
 
 _NO_CLAIM = np.inf
+_NO_FACES = read_only(np.empty((0, 3), np.int64))
 
 
 ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers")
@@ -61,12 +62,12 @@ ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvexBody:
     """One convex body of space, its vertices numbered from 0. points (3, n): vertices; normals (4, n_faces): outward,
-    about unit, row 3 a bound on their error; anchors (n_faces,): a vertex of each face; numbers (N_NUMBERS,): columns
-    above."""
+    about unit, row 3 a bound on their error; triangles (n_faces, 3): vertices of each face, in the solid's order;
+    numbers (N_NUMBERS,): columns above."""
 
     points: FloatArray
     normals: FloatArray
-    anchors: IntArray
+    triangles: IntArray
     numbers: FloatArray
 
 
@@ -80,13 +81,16 @@ def convex_body_of(solid: Solid) -> ConvexBody | None:
             with np.errstate(all="ignore"):
                 center = 0.5 * solid.min + 0.5 * solid.max
             if bool(((solid.min < center) & (center < solid.max)).all()):
-                return _hull(corners_of_box(solid.min, solid.max), BOX_TRIANGLES.reshape(-1, 3), center)
+                return _hull(corners_of_box(solid.min, solid.max), BOX_TRIANGLES.reshape(-1, 3), center, True)
         if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
             certificate = convexity(solid)
             if certificate is not None:
-                triangles = solid.triangles if certificate.is_outward else solid.triangles[:, ::-1]
-                used, numbered = np.unique(triangles, return_inverse=True)
-                return _hull(solid.vertices[used], numbered.reshape(-1, 3), certificate.center)
+                vertices, triangles = solid.vertices, solid.triangles
+                used = np.zeros(len(vertices), np.bool_)
+                used[triangles] = True
+                if not used.all():
+                    vertices, triangles = vertices[used], (np.cumsum(used) - 1)[triangles]
+                return _hull(vertices, triangles, certificate.center, certificate.is_outward)
         return None
 
     return solid.prepared("convex_body", build)
@@ -99,19 +103,19 @@ def _ball(ball: Sphere) -> ConvexBody:
     with np.errstate(over="ignore"):
         numbers[RADIUS], numbers[ROUND] = ball.radius * (1.0 + 2.0**-40), ball.radius
         numbers[REACH] = np.abs(ball.center).max() + ball.radius
-    points = np.ascontiguousarray(ball.center[:, None])
-    return ConvexBody(points, np.empty((4, 0)), np.empty(0, np.int64), numbers)
+    points = ball.center[:, None].copy()
+    return ConvexBody(points, np.empty((4, 0)), _NO_FACES, numbers)
 
 
-def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> ConvexBody:
+def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray, is_outward: bool) -> ConvexBody:
     """Build the body of a convex hull. vertices (n, 3): all used; triangles (m, 3): caller guarantees that they face
-    outward; center: an interior point."""
+    outward, or all inward; center: an interior point."""
     normals, numbers = np.empty((4, len(triangles))), np.zeros(N_NUMBERS)
     numbers[CENTER:ASIDE] = center
-    points, triangles = np.ascontiguousarray(vertices.T), np.ascontiguousarray(triangles)
+    points, triangles = np.ascontiguousarray(vertices.T), read_only(triangles)
     with np.errstate(all="ignore"):  # an overflow makes a claim impossible, not wrong
-        _fill_arrays(points, triangles, normals, numbers)
-    return ConvexBody(points, normals, triangles[:, 0].copy(), numbers)
+        entry_of(_fill_arrays)(points, triangles, is_outward, normals, numbers)
+    return ConvexBody(points, normals, triangles, numbers)
 
 
 @merged
@@ -121,9 +125,12 @@ def point_of(points: FloatArray, point: int) -> Point3:
 
 
 @kernel
-def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, numbers: FloatArray) -> None:
+def _fill_arrays(
+    points: FloatArray, triangles: IntArray, is_outward: bool, normals: FloatArray, numbers: FloatArray
+) -> None:
     """Fill normals (4, n_faces) and numbers (N_NUMBERS,) of a hull; CENTER, an interior point, is given. points (3, n):
-    vertices; triangles (n_faces, 3). A face that is too thin gets a zero normal with an infinite error.
+    vertices; triangles (n_faces, 3), counter-clockwise from outside if is_outward, else clockwise. A face that is too
+    thin gets a zero normal with an infinite error.
 
     error of a normal: rounded differences and products are off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v|
     |w| also covers the scaling to unit length, as long as it is small against the length.
@@ -132,7 +139,7 @@ def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, n
     for item in range(triangles.shape[0]):
         a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
         v, w = minus(point_of(points, b), point_of(points, a)), minus(point_of(points, c), point_of(points, a))
-        n, sides = cross(v, w), length(v) * length(w)
+        n, sides = cross(v, w) if is_outward else cross(w, v), length(v) * length(w)
         normals[:3, item], normals[3, item] = 0.0, _NO_CLAIM
         if length(n) > 2.0**-30 * sides and 2.0**-900 < length(n) < 2.0**900:
             normals[0, item], normals[1, item], normals[2, item] = n.x / length(n), n.y / length(n), n.z / length(n)
@@ -164,14 +171,20 @@ def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, n
     numbers[REACH] = reach
 
 
+def pool_of_one(body: ConvexBody) -> ConvexArrays:
+    """Return the pool of one body; it shares the body's arrays."""
+    offsets = np.array([[0, body.points.shape[1]], [0, len(body.triangles)]])
+    return ConvexArrays(body.points, body.normals, body.triangles[:, 0].copy(), offsets, body.numbers[None])
+
+
 def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
     """Concatenate bodies into the arrays that kernels take; body k of the pool is bodies[k]."""
     first_point = _offsets([body.points.shape[1] for body in bodies])
-    first_face = _offsets([len(body.anchors) for body in bodies])
+    first_face = _offsets([len(body.triangles) for body in bodies])
     return ConvexArrays(
         np.ascontiguousarray(np.concatenate([np.empty((3, 0)), *(body.points for body in bodies)], axis=1)),
         np.ascontiguousarray(np.concatenate([np.empty((4, 0)), *(body.normals for body in bodies)], axis=1)),
-        np.concatenate([np.empty(0, np.int64), *(body.anchors + start for body, start in zip(bodies, first_point))]),
+        np.concatenate([_NO_FACES[:, 0], *(body.triangles[:, 0] + start for body, start in zip(bodies, first_point))]),
         np.stack([first_point, first_face]),
         np.concatenate([np.empty(0), *(body.numbers for body in bodies)]).reshape(-1, N_NUMBERS),
     )

@@ -64,7 +64,7 @@ def relate_convex(
         return DISJOINT
     if a.round > 0.0 and b.round > 0.0:
         return _relate_balls(np.sqrt(square), a.round, b.round, error, may_be_equal)
-    outcome = refine_portal(pool.points, a, b, start)
+    outcome = refine_portal(a, b, start)
     if outcome == APART:
         return DISJOINT
     if outcome != MEETING:
@@ -143,12 +143,12 @@ def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody,
     error = 8.0 * (a.place.error + b.place.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
-        return _classify_in_ball(pool.points, a, interior_point(pool.numbers, outer, b, CENTER), b.round, error)
+        return _classify_in_ball(a, interior_point(pool.numbers, outer, b, CENTER), b.round, error)
     extent, result = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS], _WITHIN
     for face in range(first, stop):
         n = rotate(b.place, point_of(pool.normals, face))
         level = dot(n, placed(point_of(pool.points, pool.anchors[face]), b.place))
-        height, slack = support_value(pool.points, a, n) - level, extent * (1e-11 + pool.normals[3, face]) + error
+        height, slack = support_value(a, n) - level, extent * (1e-11 + pool.normals[3, face]) + error
         if height > slack:
             return _OUT
         if not height < -slack:
@@ -157,12 +157,12 @@ def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody,
 
 
 @inline
-def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
+def _classify_in_ball(a: PlacedBody, center: Point3, radius: float, error: float) -> int:
     """Return whether placed body `a` lies in an open ball, by its point farthest from the centre: _WITHIN, _OUT or
     UNDECIDED. error: bound on the error of a distance from the centre."""
     most = 0.0
     for point in range(a.first, a.stop):
-        v = minus(placed(point_of(points, point), a.place), center)
+        v = minus(placed(point_of(a.points, point), a.place), center)
         most = max(most, dot(v, v))
     reach = np.sqrt(most) + a.round
     slack = 2.0**-40 * (reach + radius) + error + 2.0**-400
@@ -215,11 +215,13 @@ class PlacedBody(NamedTuple):
 
     | field | meaning |
     |---|---|
+    | points | (3, n): vertices of the pool |
     | place | its `Placement`; `error` is twice the bound of `meshes/placement.py`: for a difference of coordinates |
     | round | radius of a ball, 0.0 for other bodies |
     | first, stop | range of its vertices in the pool |
     """
 
+    points: FloatArray
     place: Placement
     round: float
     first: int
@@ -232,37 +234,37 @@ def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> 
     numbers, firsts, shift = pool.numbers, pool.firsts, as_point3(poses.translations, item)
     error = 2.0**-49 * (3.0 * numbers[body, REACH] + largest_of(shift)) + 2.0**-1060
     place = as_placement(poses, item, shift, error)
-    return PlacedBody(place, numbers[body, ROUND], firsts[0, body], firsts[0, body + 1])
+    return PlacedBody(pool.points, place, numbers[body, ROUND], firsts[0, body], firsts[0, body + 1])
 
 
 @merged
-def support_vertex(points: FloatArray, f: PlacedBody, local: Point3) -> int:
+def support_vertex(f: PlacedBody, local: Point3) -> int:
     """Return the index in the pool of a vertex of body f farthest, up to rounding, along `local`, a direction in the
     body's own coordinates (support mapping)."""
     best, support = -np.inf, f.first
     for point in range(f.first, f.stop):
-        value = dot(point_of(points, point), local)
+        value = dot(point_of(f.points, point), local)
         if value > best:
             best, support = value, point
     return support
 
 
 @inline
-def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
+def support_value(f: PlacedBody, d: Point3) -> float:
     """Return max d . p over all points p of a placed body, its radius included, rounded (support function)."""
     local = rotate_back(f.place, d)
     best, other = -np.inf, -np.inf
     for point in range(f.first, f.stop - 1, 2):  # two chains: a maximum waits for the one before
-        value, second = dot(point_of(points, point), local), dot(point_of(points, point + 1), local)
+        value, second = dot(point_of(f.points, point), local), dot(point_of(f.points, point + 1), local)
         best, other = value if value > best else best, second if second > other else other
-    best = max(dot(point_of(points, f.stop - 1), local), best, other)
+    best = max(dot(point_of(f.points, f.stop - 1), local), best, other)
     if f.round > 0.0:
         best += f.round * length(d)
     return best + dot(d, f.place.shift)
 
 
 @inline
-def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
+def is_separating_axis(a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
     """Return whether largest d . a < least d . b is proven: placed body a lies below b along direction d (separating
     axis).
 
@@ -274,7 +276,7 @@ def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Poin
         together 16.2 u reach + 4 u |t|  <  1.1 * 16 u (3 reach + |t|) = 1.1 error
         gap > 2.25 (e_a + e_b) |d|_1 proves the sign, with room for its own rounding
     """
-    size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(support_value(points, a, d) + support_value(points, b, negative(d)))
+    size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(support_value(a, d) + support_value(b, negative(d)))
     return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
 
 
@@ -309,7 +311,7 @@ def _size(a: Point3) -> float:
 
 
 @inline
-def refine_portal(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
+def refine_portal(a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
     """Minkowski portal refinement (XenoCollide): return APART (proven disjoint), MEETING (proven: the open interiors
     intersect) or UNSETTLED, for bodies placed by a and b. v0: a point of the interior of the Minkowski difference {a -
     b}, off its symmetries. The portal is a triangle v1 v2 v3 of points of the difference that the ray from v0 through
@@ -319,15 +321,15 @@ def refine_portal(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) 
     d, v1, v2, v3 = negative(v0), v0, v0, v0
     stage = 0
     for _ in range(_TURNS):
-        i = support_vertex(points, a, rotate_back(a.place, d))
-        j = support_vertex(points, b, rotate_back(b.place, negative(d)))
-        v = minus(placed(point_of(points, i), a.place), placed(point_of(points, j), b.place))
+        i = support_vertex(a, rotate_back(a.place, d))
+        j = support_vertex(b, rotate_back(b.place, negative(d)))
+        v = minus(placed(point_of(a.points, i), a.place), placed(point_of(b.points, j), b.place))
         if rounding > 0.0:
             scale = rounding / length(d)
             v = Point3(v.x + scale * d.x, v.y + scale * d.y, v.z + scale * d.z)
         height = dot(v, d)
         if not height > 0.0:
-            return APART if is_separating_axis(points, a, b, d) else UNSETTLED
+            return APART if is_separating_axis(a, b, d) else UNSETTLED
         if stage == 0:
             v1, d, stage = v, cross(v0, v), 1
             continue

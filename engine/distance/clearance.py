@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal, Unpack, overload
 
 import numpy as np
@@ -14,6 +16,7 @@ from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
 from engine.distance import forms
+from engine.distance.convex_nearest import fill_gaps_of_hulls, nearest_of_hulls
 from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
@@ -100,9 +103,9 @@ def clearance(
     Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
     points given may be a little nearer or further. Poses are exact images, as for `collide`.
 
-    Cost: boxes along the axes, balls and half-spaces some 4 us, small bodies of the plane 8. Others both trees, built
-    once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers for ties. Where sums of
-    coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
+    Cost: boxes along the axes, balls and half-spaces some 4 us, convex bodies of up to 100 faces 6, small bodies of the
+    plane 8. Others both trees, built once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers
+    for ties. Where sums of coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
 
     For many poses of one pair use `clearance_poses`.
 
@@ -171,6 +174,9 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
     closed = (forms.between_form_and_plane if planes else forms.between_forms)(first, second, poses, least)
     if closed is not None:
         return closed
+    nearest = None if planes or first.dimension == 2 else nearest_of_hulls(first, second, poses)
+    if nearest is not None and nearest.distance != least:
+        return nearest if least is None else nearest.distance > least
     if least is not None and not planes:
         answers = np.full(1, np.nan)
         spread_pair(first, second, poses, budget).fill(0, 1, answers, Fraction(least))
@@ -277,7 +283,6 @@ class _Batch:
         self.first, self.second, self.poses, self.budget = first, second, poses, budget
         n_poses = len(poses.rotations)
         self.relations = np.full(n_poses, UNSETTLED, np.int8)
-        self.relate = batch_of(first, second, poses, Answers(budget, True, self.relations, None, None))
         self.spread = None if has_plane(first, second) or not n_poses else in_space(poses.rotations, poses.translations)
         self.is_small = self.spread is not None and forms.are_small(first, second)
         self.n_exact = 0
@@ -285,12 +290,15 @@ class _Batch:
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
         """Fill answers[start:stop], NaN on entry, with the distances under these poses; threads may fill different
         ranges. least: if given, 0.0 for nearer bodies and infinity for others instead."""
-        if self.relate is not None and not self.is_small:
-            self.relate(start, stop)
+        turns, moves = read_only(self.poses.rotations[start:stop]), read_only(self.poses.translations[start:stop])
         if self.is_small:
-            turns, moves = read_only(self.poses.rotations[start:stop]), read_only(self.poses.translations[start:stop])
             motions = *forms.STILL2, turns, moves
             answers[start:stop] = forms.distances_under_poses(self.first, self.second, motions, least, self.budget)
+        elif self.spread is not None and self.first.dimension == 3:
+            some = PoseArrays(turns, moves, True)
+            fill_gaps_of_hulls(self.first, self.second, some, least, answers[start:stop], self.budget)
+        if not self.is_small and np.isnan(answers[start:stop]).any() and self.relate is not None:
+            self.relate(start, stop)
         left = start + np.flatnonzero(np.isnan(answers[start:stop]))
         for item in left.tolist():
             self.budget.check()
@@ -308,6 +316,12 @@ class _Batch:
             pair = SpreadPair(self.first, self.second, STILL, self.spread, self.budget)
             pair.fill(start, stop, answers, least)
             self.n_exact += pair.n_exact
+
+    @cached_property
+    def relate(self) -> Callable[[int, int], None] | None:
+        """What `batch_of` returns: it builds what only bodies need whose distance is not proven at once."""
+        answers = Answers(self.budget, True, self.relations, None, None)
+        return batch_of(self.first, self.second, self.poses, answers)
 
     def _poses(self, item: int) -> Poses:
         """Return the poses of both bodies for pose number ``item``: None for the first."""

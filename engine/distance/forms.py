@@ -196,7 +196,7 @@ def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget
         value = value_at(plane, point)
         if best is None or value >= best[0]:
             triangle, corner = np.argwhere(mesh.arrays.triangles == vertex)[0].tolist()
-            feature = feature_of(body, mesh, triangle, corner)
+            feature = feature_of(body, mesh.arrays, triangle, corner)
             if best is None or value > best[0] or feature.indices < best[2].indices:
                 best = value, point, feature
     assert best is not None

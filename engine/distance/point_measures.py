@@ -216,6 +216,6 @@ class TriangleMeasure:
             return
         for row in np.flatnonzero(codes[:, 1] >= 0).tolist():
             triangle, code = codes[row].tolist()
-            kind, numbers = feature_of(self.solid, self.body, triangle, code)
+            kind, numbers = feature_of(self.solid, self.body.arrays, triangle, code)
             features.face[row], features.kind[row] = self.body.faces[triangle], KINDS.index(kind)
             features.numbers[row, : len(numbers)] = numbers

@@ -87,7 +87,8 @@ class SpreadPair:
 
     def _features(self, triangles: Sequence[int], codes: Sequence[int]) -> tuple[Feature, Feature]:
         """Return the caller's features for a triangle of each body and a feature code of each."""
-        first, second = map(feature_of, self.solids, self.meshes, triangles, codes)
+        meshes = (mesh.arrays for mesh in self.meshes)
+        first, second = map(feature_of, self.solids, meshes, triangles, codes)
         return first, second
 
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
@@ -293,15 +294,15 @@ def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
     return PoseArrays(read_only(turns), read_only(moves), True)
 
 
-def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Feature:
+def feature_of(solid: Solid, mesh: Any, triangle: int, code: int) -> Feature:
     """Return the feature with code `code` (`near_triangles.py`) of a triangle of a solid's mesh, in the caller's
-    numbering of vertices and faces."""
+    numbering of vertices and faces. mesh: `MeshArrays`, or other arrays of its vertices, triangles and their faces."""
     if isinstance(solid, Sphere):
         return BALL
     face = int(mesh.faces[triangle])
     if code == FACE:
         return Feature("face", (face,))
-    corners, vertices = mesh.arrays.triangles[triangle].tolist(), mesh.arrays.vertices
+    corners, vertices = mesh.triangles[triangle].tolist(), mesh.vertices
     if isinstance(solid, Mesh) and len(set(corners)) == 3:
         numbers = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]].tolist()
         if len(numbers) == 3:  # case: a triangle, its corners in the caller's order

@@ -16,10 +16,11 @@ Conversely a convex solid whose triangles all have an area passes, provided o li
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
 from engine.solids.mesh import Polyhedron
@@ -47,20 +48,25 @@ def convexity(solid: Polyhedron) -> Convexity | None:
 def _certified(solid: Polyhedron) -> Convexity | None:
     vertices, triangles = read_only(solid.vertices), read_only(solid.triangles)
     with np.errstate(all="ignore"):  # an overflow is not certified; kernels, where they run uncompiled
-        center = vertices[triangles.ravel()].mean(axis=0)
-        side = _common_side(vertices, triangles, center) if np.isfinite(center).all() else 0
+        center, side = _center_and_side(vertices, triangles)
         if side == 0:
             return None
         starts, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
         edges, turned = starts * len(vertices) + ends, ends * len(vertices) + starts
-        order, turned_order = np.argsort(edges), np.argsort(turned)
+        order, turned_order = edges.argsort(), turned.argsort()
         edges = edges[order]
         if (edges[1:] == edges[:-1]).any() or (edges != turned[turned_order]).any():
             return None
         others = np.empty_like(order)
         others[turned_order] = order
-        is_convex = _is_convex(vertices, triangles, others, center, side)
+        is_convex = entry_of(_is_convex)(vertices, triangles, others, center, side)
     return Convexity(center, side < 0) if is_convex else None
+
+
+def _center_and_side(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, int]:
+    """Return the mean corner of all triangles, and their common side of it, 0 if there is none."""
+    center = vertices[triangles.ravel()].sum(axis=0) / triangles.size
+    return center, entry_of(_common_side)(vertices, triangles, center) if isfinite(sum(center.tolist())) else 0
 
 
 def star_side(solid: Polyhedron) -> int:
@@ -68,8 +74,7 @@ def star_side(solid: Polyhedron) -> int:
     this file, with its faces counter-clockwise seen from outside, 1 with clockwise ones; 0 if that is not certain."""
     vertices, triangles = read_only(solid.vertices), read_only(solid.triangles)
     with np.errstate(all="ignore"):
-        center = vertices[triangles.ravel()].mean(axis=0)
-        side = _common_side(vertices, triangles, center) if np.isfinite(center).all() else 0
+        center, side = _center_and_side(vertices, triangles)
         return side if side != 0 and _is_graph(vertices, triangles, center, side) else 0
 
 

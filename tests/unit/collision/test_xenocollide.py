@@ -22,7 +22,7 @@ def ask(pool: ConvexArrays, placed: PoseArrays, found: Any) -> None:
     for item in range(found.shape[0]):
         a, b = placed_body(pool, 0, placed, 0), placed_body(pool, 1, placed, item)
         start = minus(interior_point(pool.numbers, 0, a, CENTER), interior_point(pool.numbers, 1, b, ASIDE))
-        found[item] = refine_portal(pool.points, a, b, start)
+        found[item] = refine_portal(a, b, start)
 
 
 def claims(second: Aabb, placed: list[Pose]) -> list[int]:
