@@ -20,8 +20,8 @@ from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_point, to_local_frame
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
-from engine.collision.meshes.separated import FEW, kind_of_pair, touches_in_planes
-from engine.collision.meshes.touching import N_FACES, are_separated, flush, relate_by_contacts
+from engine.collision.meshes.separated import FEW, N_FACES, kind_of_pair, touches_apart
+from engine.collision.meshes.touching import flush, relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COMMON_AREA, COPLANAR, CORNER, CROSSING
 from engine.compiling.jit import called, inline, kernel
 from engine.predicates.vectors import as_point3
@@ -152,36 +152,32 @@ def relate_poses(
     contacts than fit, or without proof, are UNSETTLED. The contacts of the last pose stay there. n_known: number of
     contacts of one pose that `contacts` holds already, so that no search runs; 0: search. Stops early when the flag is
     set."""
-    are_few = first.faces.shape[0] * second.faces.shape[0] <= FEW and len(contacts.met) == 0
-    are_few = are_few and n_named >= 0 and seek != dual.SEEK_CONTACT
+    first_stage = 0 if len(contacts.met) == 0 and n_named >= 0 and seek != dual.SEEK_CONTACT else 2
+    are_few = first.faces.shape[0] * second.faces.shape[0] <= FEW
+    few = dual.Contacts(contacts.pairs[:N_FACES], contacts.kinds[:N_FACES], contacts.met)
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
         place, is_apart = dual.place_bodies(first, still, 0, second, poses, item, descent)
         s = dual.Search(first, second, place, descent, seek, contacts, flag)
-        how, n_pairs, is_first, is_parted = dual.DONE, n_known, are_few, False
-        while n_known == 0 and not is_apart:  # bound: twice
-            goal = dual.SEEK_CONTACT if is_first else seek
-            how, n_pairs = dual.search(dual.Search(first, second, place, descent, goal, contacts, flag))
-            if not is_first or how != dual.SETTLED or dual.is_decisive(
-                s, contacts.kinds[0], contacts.pairs[0, 0], contacts.pairs[0, 1]
-            ):  # fmt: skip
-                break
-            is_first, is_parted = False, contacts.kinds[0] != CROSSING and touches_in_planes(s, n_named > 0, row)
-            if is_parted:
-                break
-        row[N_CONTACTS] = n_pairs
+        how, n_pairs, is_parted, is_done = dual.DONE, n_known, False, n_known > 0 or is_apart
+        for stage in range(first_stage, 3):  # one contact, then a few: a plane at them may separate the bodies
+            if is_done or (stage == 1 and are_few):
+                continue
+            goal = dual.SEEK_CONTACT if stage == 0 else seek
+            how, n_pairs = dual.search(
+                dual.Search(first, second, place, descent, goal, few if stage == 1 else contacts, flag)
+            )
+            is_done = stage == 2 or how != (dual.SETTLED if stage == 0 else dual.FULL)
+            if not is_done and contacts.kinds[0] != CROSSING:
+                is_done = is_parted = touches_apart(s, min(n_pairs, len(few.kinds)), n_named > 0, row)
+            elif stage == 0 and not is_done:
+                is_done = dual.is_decisive(s, CROSSING, contacts.pairs[0, 0], contacts.pairs[0, 1])
+        row[N_CONTACTS] = 1 if is_parted else n_pairs
         if how == dual.INTERRUPTED:
             return
         if is_parted:
             continue
-        if (
-            how == dual.FULL
-            and n_named >= 0
-            and len(contacts.met) == 0
-            and are_separated(s, min(N_FACES, len(contacts.kinds)))
-        ):
-            n_pairs = len(contacts.kinds)
         if how == dual.SETTLED:
             i, j, is_overlap = (
                 contacts.pairs[0, 0],
@@ -203,5 +199,3 @@ def relate_poses(
                 classify_in_detail(s, n_pairs)
             else:
                 write_contact_row(s, n_pairs, n_named, row)
-                if how == dual.FULL and row[RELATION] != UNSETTLED and (n_named == 0 or row[KIND] != UNSETTLED):
-                    row[N_CONTACTS] = n_pairs

@@ -24,10 +24,10 @@ import numpy as np
 from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes import parity
-from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces, pose_number, relation_of_flush
+from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces, relation_of_flush
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import Placement, defect_of
-from engine.collision.meshes.separating_planes import Vertices, separates
+from engine.collision.meshes.separated import N_FACES, separating_contact
 from engine.collision.meshes.triangle_triangle import (
     CORNER,
     Facet,
@@ -43,25 +43,6 @@ from engine.compiling.jit import allocating, called, inline
 from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.predicates.vectors import as_point3, largest_of, minus
 from engine.types import UNDECIDED, BoolArray, FloatArray, IntArray
-
-N_FACES = 32
-"""Number of contacts whose face planes are tried as separating planes."""
-
-
-@called
-def are_separated(s: Search, n_faces: int) -> bool:
-    """Return whether the plane of either face of one of the first n_faces contacts is proven to separate the two
-    bodies."""
-    poses, error = s.descent.poses, exact_error(s)
-    u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
-    v = Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
-    for item in range(n_faces):
-        t, w, _, _ = exact_faces(s, s.contacts.pairs[item, 0], s.contacts.pairs[item, 1])
-        if separates(poses, t, u, v, error) or separates(poses, w, u, v, error):
-            return True
-        if s.flag[0] != 0:
-            return False
-    return False
 
 
 @called
@@ -164,7 +145,7 @@ def relate_clean(s: Search, n: int) -> int:
 def relate_by_contacts(s: Search, n: int, has_crossing: bool) -> int:
     """Return OVERLAPPING or TOUCHING if the n contacts of two placed bodies decide it, else UNSETTLED. has_crossing:
     some contact is a crossing, though none proves overlapping."""
-    if are_separated(s, min(N_FACES, n)):
+    if separating_contact(s, min(N_FACES, n)) >= 0:
         return TOUCHING
     return relate_clean(s, n) if s.first.has_inside and s.second.has_inside and not has_crossing else UNSETTLED
 
