@@ -24,8 +24,8 @@ from engine.collision.collide import (
     pair_function,
     posed,
 )
+from engine.collision.convex_batch import relate_convex_pairs
 from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
-from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline import witness_of
 from engine.collision.outline_batch import outline_pool, relate_outline_pairs

@@ -46,14 +46,14 @@ _NO_CLAIM = np.inf
 _NO_FACES = read_only(np.empty((0, 3), np.int64))
 
 
-ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers")
+ConvexArrays = namedtuple("ConvexArrays", "points normals triangles firsts numbers")
 """Convex bodies, concatenated into few arrays, because kernels count references to each.
 
 | field | shape | meaning |
 |---|---|---|
 | points | (3, n) | vertices |
 | normals | (4, n_faces) | about unit, outward; row 3: relative error |
-| anchors | (n_faces,) | a vertex of each face |
+| triangles | (n_faces, 3) | vertices of each face |
 | firsts | (2, n_bodies + 1) | offsets of vertices and faces |
 | numbers | (n_bodies, N_NUMBERS) | columns above |
 """
@@ -174,7 +174,7 @@ def _fill_arrays(
 def pool_of_one(body: ConvexBody) -> ConvexArrays:
     """Return the pool of one body; it shares the body's arrays."""
     offsets = np.array([[0, body.points.shape[1]], [0, len(body.triangles)]])
-    return ConvexArrays(body.points, body.normals, body.triangles[:, 0].copy(), offsets, body.numbers[None])
+    return ConvexArrays(body.points, body.normals, body.triangles, offsets, body.numbers[None])
 
 
 def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
@@ -184,7 +184,7 @@ def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
     return ConvexArrays(
         np.ascontiguousarray(np.concatenate([np.empty((3, 0)), *(body.points for body in bodies)], axis=1)),
         np.ascontiguousarray(np.concatenate([np.empty((4, 0)), *(body.normals for body in bodies)], axis=1)),
-        np.concatenate([_NO_FACES[:, 0], *(body.triangles[:, 0] + start for body, start in zip(bodies, first_point))]),
+        read_only(np.concatenate([_NO_FACES, *(body.triangles + at for body, at in zip(bodies, first_point))])),
         np.stack([first_point, first_face]),
         np.concatenate([np.empty(0), *(body.numbers for body in bodies)]).reshape(-1, N_NUMBERS),
     )

@@ -33,12 +33,11 @@ import numpy as np
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, rotate, rotate_back
-from engine.compiling.jit import inline, kernel, merged
+from engine.compiling.jit import inline, merged
 from engine.predicates.vectors import as_point3, cross, dot, largest_of, length, minus, negative
-from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point3
+from engine.types import UNDECIDED, FloatArray, Point3
 
 _OUT, _WITHIN = 0, 1
-_POLL_EVERY = 256
 LARGEST_ERROR = 2.0**250
 """Bound on the error of placed bodies: reached where coordinates are about 2^299; products of four lengths stay finite.
 """
@@ -147,7 +146,7 @@ def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody,
     extent, result = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS], _WITHIN
     for face in range(first, stop):
         n = rotate(b.place, point_of(pool.normals, face))
-        level = dot(n, placed(point_of(pool.points, pool.anchors[face]), b.place))
+        level = dot(n, placed(point_of(pool.points, pool.triangles[face, 0]), b.place))
         height, slack = support_value(a, n) - level, extent * (1e-11 + pool.normals[3, face]) + error
         if height > slack:
             return _OUT
@@ -167,41 +166,6 @@ def _classify_in_ball(a: PlacedBody, center: Point3, radius: float, error: float
     reach = np.sqrt(most) + a.round
     slack = 2.0**-40 * (reach + radius) + error + 2.0**-400
     return _OUT if reach > radius + slack else (_WITHIN if reach < radius - slack else UNDECIDED)
-
-
-@merged
-def _has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
-    """Return whether poses i and j are equal; the relation is then that of the two unposed bodies."""
-    for k in range(3):
-        for m in range(3):
-            if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
-                return False
-    return True
-
-
-@kernel
-def relate_convex_pairs(
-    pool: ConvexArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, is_boolean: bool, may_be_equal: bool,
-    relations: Int8Array, flag: FlagArray,
-) -> None:  # fmt: skip
-    """Replace the UNSETTLED entries of relations (n,) int8 by the relation codes of pairs (n, 2) of rows where floats
-    prove one. A row is a body under a pose: bodies (n_rows,), its index in the pool, -1 if it has none there; poses,
-    one a row, row 0 the identity. is_boolean: OVERLAPPING may be given where one body contains the other; may_be_equal:
-    and for equal bodies. Returns early when the flag is set."""
-    for item in range(pairs.shape[0]):
-        if item % _POLL_EVERY == 0 and flag[0] != 0:
-            return
-        i, j = pairs[item, 0], pairs[item, 1]
-        first, second = bodies[i], bodies[j]
-        if relations[item] != UNSETTLED or first < 0 or second < 0:
-            continue
-        if _has_equal_pose(poses.rotations, poses.translations, i, j):
-            i = j = 0
-            if first == second and may_be_equal:
-                relations[item] = OVERLAPPING
-                continue
-        a, b = placed_body(pool, first, poses, i), placed_body(pool, second, poses, j)
-        relations[item] = relate_convex(pool, first, second, a, b, is_boolean, may_be_equal)
 
 
 APART, MEETING = 0, 1

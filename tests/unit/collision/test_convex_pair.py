@@ -11,8 +11,8 @@ import pytest
 from engine import Aabb, Polyhedron, Pose, Relation, Solid, Sphere, collide, collide_poses
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
+from engine.collision.convex_batch import relate_convex_pairs
 from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, convex_body_of, pool_bodies
-from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Work
 
