@@ -387,6 +387,10 @@ def call_group(index: int) -> None:
     if hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {cores[index % len(cores)]})
+    with contextlib.suppress(ImportError, AttributeError):  # without it kernels are as right
+        from engine.compiling.compilers import forget_paths
+
+        forget_paths()
     for step in GROUPS[index]:
         STEPS[step]()
     if index == len(GROUPS) - 1:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import inspect
 import io
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from typing import Any, Final
 
 import llvmlite.binding
@@ -15,18 +17,27 @@ from numba.core.caching import NullCache
 from numba.core.codegen import CPUCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompileResult, compile_result
 from numba.core.environment import _rebuild_env
+from numba.core.funcdesc import PythonFunctionDescriptor
 from numba.core.runtime import rtsys
-from numba.core.serialize import dumps
+from numba.core.serialize import NumbaPickler
+from numba.core.types import Type
+from numba.core.types.abstract import _type_reconstructor  # type: ignore[attr-defined, unused-ignore]
+from numba.core.typing import signature
 
 from engine.compiling import require
 from engine.compiling.kernel_cache import COMPLETE, cache_folder, read_cached, warn_of_compiling, write_cached
-from engine.compiling.sources import as_imported, matches_its_source, source_digest
+from engine.compiling.sources import PREFIX, as_imported, matches_its_source, plain_name, source_digest
 
 require(
     {
         NullCache: ("load_overload", "save_overload"),
-        CompileResult: ("_reduce",),
-        CPUCodeLibrary: ("_set_compiled_object", "enable_object_caching", "_finalize_final_module"),
+        CompileResult: ("_find_referenced_environments",),
+        CPUCodeLibrary: (
+            "_set_compiled_object",
+            "_get_compiled_object",
+            "enable_object_caching",
+            "_finalize_final_module",
+        ),
         JITCPUCodegen: ("set_env", "create_library"),
     }
 )
@@ -77,74 +88,105 @@ class KernelCache(NullCache):  # type: ignore[misc]
     def cache_path(self) -> str:
         return f"{cache_folder()}/{source_digest(self._function.__module__)}"
 
-    def _name(self, types: Any, cpu: tuple[str, str]) -> str:
-        key = hashlib.sha256(repr((types, cpu)).encode()).hexdigest()[:20]
+    def _name(self, kinds: Any, cpu: tuple[str, str]) -> str:
+        key = hashlib.sha256(repr((kinds, *_fields(kinds), cpu)).encode()).hexdigest()[:20]
         return f"{source_digest(self._function.__module__)}/{self._function.__qualname__}-{key}.nbc"
 
-    def load_overload(self, types: Any, target_context: Any) -> CompileResult | None:
-        """Return the kernel for `types` and this CPU, else for a family that it belongs to; None if neither is cached.
+    def load_overload(self, kinds: Any, target_context: Any) -> CompileResult | None:
+        """Return the kernel for arguments of these types and this CPU, else for a family that it belongs to; None if
+        neither is cached.
 
         numba first imports everything that it can compile, a third of a second; compiling does that by itself.
         """
         rtsys.initialize(target_context)
         for cpu in cpus() if source_digest(self._function.__module__) else ():
-            content = read_cached(self._name(types, cpu))
-            if content:
-                try:
-                    parts = _Unpickler(io.BytesIO(content)).load()
-                except (ImportError, AttributeError):  # case: the class of an argument has moved to another module
-                    continue
-                return _rebuilt(target_context, *parts)
+            if content := read_cached(self._name(kinds, cpu)):
+                return self._rebuilt(kinds, target_context, *_Unpickler(io.BytesIO(content)).load())
         warn_of_compiling(self._function.__module__)
         return None
 
-    def save_overload(self, types: Any, result: CompileResult) -> None:
+    def _rebuilt(
+        self, kinds: Any, context: Any, name: str, code: bytes, result: Any, constants: Any, reload: Any
+    ) -> CompileResult:
+        """Return a stored kernel, ready to be called."""
+        for prepare in reload:
+            prepare()
+        described = PythonFunctionDescriptor(
+            native=True,
+            modname=self._function.__module__,
+            qualname=self._function.__qualname__,
+            unique_name=name,
+            doc="",
+            typemap=None,
+            restype=result,
+            calltypes=None,
+            args=inspect.getfullargspec(self._function).args,
+            kws=(),
+            mangler=lambda *_, **__: name,
+            argtypes=kinds,
+            env_name=constants[-1][2],
+        )
+        codegen = context.codegen()
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols |= {name, described.llvm_cpython_wrapper_name}
+        environments = [_rebuild_env(as_imported(home), values, at) for home, values, at in constants]
+        for environment in environments:
+            codegen.set_env(environment.env_name, environment)
+        return compile_result(
+            target_context=context,
+            typing_context=context.typing_context,
+            library=library,
+            environment=environments[-1],
+            entry_point=context.get_executable(library, described, environments[-1]),
+            fndesc=described,
+            signature=signature(result, *kinds),
+            objectmode=False,
+            lifted=(),
+            reload_init=reload,
+            referenced_envs=environments,
+        )
+
+    def save_overload(self, kinds: Any, made: CompileResult) -> None:
         """Store the machine code of the kernel compiled for arguments of these types; numba calls this. Nothing is
         stored for code with dynamic globals, or where the code that runs may not be that of the sources on disk, of
         which the file's name has a digest."""
         module = self._function.__module__
-        if not result.library.has_dynamic_globals and source_digest(module) and matches_its_source(module):
-            (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()
-            constants = [item for item in constants if item.consts]
-            content = dumps((name, code, fndesc, environment, signature, reload, constants))
-            write_cached(self._name(types, cpus()[0]), content)
+        if not made.library.has_dynamic_globals and source_digest(module) and matches_its_source(module):
+            others = [each for each in made._find_referenced_environments() if each.consts]
+            environments = [each for each in others if each is not made.environment] + [made.environment]
+            constants = [(plain_name(each.globals["__name__"]), each.consts, each.env_name) for each in environments]
+            name, code, result = made.fndesc.mangled_name, made.library._get_compiled_object(), made.fndesc.restype
+            _Pickler(content := io.BytesIO()).dump((name, code, result, constants, made.reload_init))
+            write_cached(self._name(kinds, cpus()[0]), content.getvalue())
+
+
+def _fields(kinds: Any) -> Iterator[Any]:
+    """Yield the names of fields of each named tuple within types: their order may change while the types do not."""
+    for kind in kinds:
+        yield from (*getattr(kind, "fields", ()), *_fields(getattr(kind, "types", ())))
+
+
+class _Pickler(NumbaPickler):  # type: ignore[misc]
+    """Writes a kernel, with the same bytes whatever name the engine is imported by, and whatever was compiled before
+    it: a type has a number in its process."""
+
+    def persistent_id(self, item: Any) -> Any:
+        is_ours = isinstance(item, type) and item.__module__.startswith(f"{PREFIX}engine.")
+        return (plain_name(item.__module__), item.__qualname__) if is_ours else None
+
+    def reducer_override(self, item: Any) -> Any:
+        made: Any = item.__reduce__() if isinstance(item, Type) else None
+        if made is None or made[0] is not _type_reconstructor:
+            return super().reducer_override(item)
+        *by, state = made[1]
+        return _type_reconstructor, (*by, {name: value for name, value in state.items() if name != "_code"})
 
 
 class _Unpickler(pickle.Unpickler):
-    """Reads a kernel that was compiled while the engine was imported by this name or its other one."""
+    """Reads a kernel, whatever name the engine was imported by when it was compiled."""
 
-    def find_class(self, module: str, name: str) -> Any:
-        return _rebuilt_env if name == "_rebuild_env" else super().find_class(as_imported(module), name)
-
-
-def _rebuilt_env(module: str, *more: Any) -> Any:
-    return _rebuild_env(as_imported(module), *more)
-
-
-def _rebuilt(
-    context: Any, name: str, code: bytes, fndesc: Any, environment: Any, signature: Any, reload: Any, constants: Any
-) -> CompileResult:
-    """Return a stored kernel, ready to be called."""
-    for prepare in reload:
-        prepare()
-    codegen = context.codegen()
-    library = codegen.create_library(name)
-    library.enable_object_caching()
-    library._set_compiled_object(code)
-    library._finalize_final_module()
-    codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
-    for item in constants:
-        codegen.set_env(item.env_name, item)
-    return compile_result(
-        target_context=context,
-        typing_context=context.typing_context,
-        library=library,
-        environment=environment,
-        entry_point=context.get_executable(library, fndesc, environment),
-        fndesc=fndesc,
-        signature=signature,
-        objectmode=False,
-        lifted=(),
-        reload_init=reload,
-        referenced_envs=constants,
-    )
+    def persistent_load(self, name: Any) -> Any:
+        return functools.reduce(getattr, name[1].split("."), import_module(as_imported(name[0])))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import gc
+import hashlib
 import threading
 import types
 import warnings
@@ -15,11 +16,13 @@ import llvmlite.binding
 import numba
 import numpy as np
 from numba import njit
+from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.cpu import CPUContext
 from numba.core.environment import lookup_environment
+from numba.core.funcdesc import default_mangler
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.targetconfig import ConfigStack
@@ -30,6 +33,7 @@ from numba.core.typing import Context
 from numba.core.untyped_passes import InlineClosureLikes
 
 from engine.compiling import require
+from engine.compiling.sources import plain_name
 
 require(
     {
@@ -46,7 +50,8 @@ require(
         Context: ("resolve_function_type", "resolve_getattr"),
         CPUDispatcher: ("get_call_template",),
         NativeLowering: ("run_pass", "lowering_class"),
-        CPUContext: ("codegen",),
+        CPUContext: ("codegen", "mangler"),
+        FunctionIdentity: ("from_function",),
         Lower: ("setup_function",),
     }
 )
@@ -118,15 +123,36 @@ class _KernelLibrary(_Library):
 
         What is linked in becomes private: a function with one call is inlined whatever its size, and an unused
         argument, such as most arrays of a table, is not passed. It gets a name of its own, since the linker would take
-        it for stock numba's version of the same function, and finds no address; a short one, since names that spell out
-        the types of all arguments are a third of an object file.
+        it for stock numba's version of the same function, and finds no address. Constants, and the addresses of those
+        that are empty, become private too: no name of them is in the object file. No exception passes these functions.
         """
-        for number, function in enumerate(self._final_module.functions):
+        module, kept = self._final_module, set()
+        for number, function in enumerate(module.functions):
+            function.add_function_attribute("nounwind")
             if function.linkage == llvmlite.binding.Linkage.linkonce_odr:
-                function.linkage = "internal"
-                function.name = f"inner.{number}"
+                function.linkage, function.name = "private", f"inner.{number}"
+            else:
+                kept.add(f"{_CONSTANTS}{function.name[3:]}")
+        for number, variable in enumerate(module.global_variables):
+            constants = lookup_environment(variable.name)
+            is_ours = constants is not None and not constants.consts and variable.name not in kept
+            if is_ours or variable.linkage == llvmlite.binding.Linkage.internal:
+                variable.linkage, variable.name = "private", f"constant.{number}"
         passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
+        passes.run(module, builder)
+
+
+_CONSTANTS = "_ZN08NumbaEnv"
+"""What the names of addresses of constants begin with, in place of "_ZN"."""
+
+
+def _short_name(name: str, kinds: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
+    """Return the name of compiled code: the same under both names of the engine, with a hash of its types.
+
+    All types spelt out were half of an object file.
+    """
+    text = repr((*kinds, *abi_tags)).encode()
+    return str(default_mangler(plain_name(name), (), abi_tags=[hashlib.sha256(text).hexdigest()[:12]], uid=uid))
 
 
 class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
@@ -152,6 +178,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         context, codegen = state.targetctx, state.targetctx.codegen()
         state.library = self._library(state.func_id.func_qualname, codegen)
         state.targetctx = copy.copy(context)
+        state.targetctx.mangler = _short_name
         state.targetctx._internal_codegen = _InnerCodegen(codegen)
         done: bool = super().run_pass(state)
         state.targetctx = context
@@ -219,6 +246,19 @@ def _typing(shared: Context, counts: bool) -> _Typing:
     return _Typing(shared)
 
 
+def forget_paths() -> None:
+    """Compile from now on as if sources were files of no folder. Code that raises holds the name of its file, and where
+    numba is installed stood in kernels that sort. For a process that only compiles."""
+    identify = FunctionIdentity.from_function
+
+    def without_path(function: Any) -> Any:
+        identity = identify(function)
+        identity.filename = f"{plain_name(identity.modname)}.py"
+        return identity
+
+    FunctionIdentity.from_function = without_path
+
+
 def _check_result(context: Any, result: Any, name: str) -> None:
     """Raise TypeError for a result with arrays, if only one side would count references to them."""
     if context.data_model_manager[result].contains_nrt_meminfo():
@@ -237,7 +277,8 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
     def compile_extra(self, function: Any) -> Any:
         """Compile, with the garbage collector relaxed (10 % of compile time).
 
-        Raises: TypeError if a kernel that does not count references returns arrays: Python would free them.
+        Raises: TypeError if a kernel that does not count references returns arrays: Python would free them; if one
+        returns a named tuple: its machine code would look for the class by the module's name of today.
         """
         usual = gc.get_threshold()
         gc.set_threshold(50_000, 20, 50)
@@ -245,18 +286,15 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
             made = super().compile_extra(function)
         finally:
             gc.set_threshold(*usual)
+        result = made.signature.return_type
         if type(self) is KernelCompiler and not self.state.flags.nrt:
-            _check_result(self.state.targetctx, made.signature.return_type, function.__qualname__)
+            _check_result(self.state.targetctx, result, function.__qualname__)
+        if type(self) is KernelCompiler and hasattr(result, "instance_class"):
+            raise TypeError(f"{function.__qualname__} returns {result}: another process may import its class elsewhere")
         return made
 
     def define_pipelines(self) -> list[Any]:
-        """Drop the passes for whole-array expressions, and for closures in a function that has none.
-
-        Code that raises holds the name of its file: it gets one that is the same wherever the sources are.
-        """
-        self.state.func_id.filename = (
-            f"{self.state.func_id.modname.removeprefix('exact_geometry.').replace('.', '/')}.py"
-        )
+        """Drop the passes for whole-array expressions, and for closures in a function that has none."""
         if not compiles_correctly():
             return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -286,7 +324,8 @@ class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
     """
 
     def __repr__(self) -> str:
-        return f"{self.py_func.__module__}.{self.py_func.__qualname__}"  # part of the names of those it is passed to
+        """Return its name, part of the names of those it is passed to."""
+        return f"{plain_name(self.py_func.__module__)}.{self.py_func.__qualname__}"
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         plain = {name: unliteral(kind) for name, kind in kws.items()}

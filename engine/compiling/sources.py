@@ -120,10 +120,14 @@ def tools() -> str:
     return ", ".join(made_by)
 
 
-def as_imported(module: str) -> str:
+def plain_name(name: str) -> str:
+    """Return the name of something of the engine without the prefix that it may have here, others as they are."""
+    return name.replace("exact_geometry.engine.", "engine.", 1)
+
+
+def as_imported(plain: str) -> str:
     """Return the name under which a module of the engine is imported here, others as they are."""
-    plain = module.removeprefix("exact_geometry.")
-    return PREFIX + plain if plain.partition(".")[0] == "engine" else module
+    return PREFIX + plain if plain.startswith("engine.") else plain
 
 
 @functools.cache

@@ -109,7 +109,7 @@ def run_blocks(
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
             n_most = int(max_active * n_vertices)
-            reduced = entry_of(reduce_pair)(first, second, size, n_most, budget.flag, scratch.addresses)
+            reduced = Loaded(*entry_of(reduce_pair)(first, second, size, n_most, budget.flag, scratch.addresses))
             if reduced.n == 0:
                 budget.check()
                 return_scratch(scratch)

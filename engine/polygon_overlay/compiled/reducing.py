@@ -41,7 +41,7 @@ from engine.polygon_overlay.compiled.ring_blocks import (
     load_blocks,
     mark_blocks,
 )
-from engine.polygon_overlay.compiled.workspace import workspace_at
+from engine.polygon_overlay.compiled.workspace import Workspace, workspace_at
 from engine.predicates.expansion import LARGEST, is_safe
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
@@ -201,12 +201,19 @@ def _activate_blocks(
 @kernel
 def reduce_pair(
     subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, addresses: IntArray
+) -> tuple[int, int, int, float]:
+    """Load two polygons into the scratch of `overlay_pairs`, with stretches of edges that meet nothing reduced to runs;
+    return the fields of `Loaded`. size: edges of a block. n_most: number of active edges from which a reduction does
+    not pay: the result has no vertices then, nor where coordinates are out of range or boxes are disjoint. Caller
+    guarantees scratch for a thousand contacts or more."""
+    made = _reduced_pair(subjects, clips, size, n_most, stop, workspace_at(addresses))
+    return made.n, made.n_rings, made.n_runs, made.largest
+
+
+@inline
+def _reduced_pair(
+    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, w: Workspace
 ) -> Loaded:
-    """Load two polygons into the scratch of `overlay_pairs`, with stretches of edges that meet nothing reduced to runs.
-    size: edges of a block. n_most: number of active edges from which a reduction does not pay: the result has no
-    vertices then, nor where coordinates are out of range or boxes are disjoint. Caller guarantees scratch for a
-    thousand contacts or more."""
-    w = workspace_at(addresses)
     n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
         w.unions.points, w.stars.node_of, w.chains.at, w.tree.boxes, w.rounded.moved, w.rings.meets, w.along.starts
