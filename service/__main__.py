@@ -111,7 +111,8 @@ def create_app() -> FastAPI:
     from service.app import create_app
     from service.memory import configure_malloc
 
-    gc.enable()  # all is imported (`main`)
+    gc.freeze()  # all is imported (`main`): to look through it while kernels are loaded is a tenth of their time
+    gc.enable()
     configure_malloc()
     sys.setswitchinterval(SWITCH_SECONDS)
     # what the lines leave out need not be looked up for each of them: it takes as long as writing the line

@@ -49,8 +49,7 @@ def configure_malloc() -> None:
 
 def freeze() -> None:
     """Exclude long-lived objects from later collections; `Memory` collects when there are few others."""
-    if not gc.get_freeze_count():
-        gc.freeze()  # half a million objects of modules and compiler
+    gc.freeze()  # half a million objects of modules and compiler
     gc.set_threshold(*gc.get_threshold()[:2], _NEVER)
 
 

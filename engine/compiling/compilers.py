@@ -57,7 +57,15 @@ require(
 )
 
 
-class _CalledLower(Lower):  # type: ignore[misc] # numba carries no types
+class _Lower(Lower):  # type: ignore[misc] # numba carries no types
+    """Lowers a function that no exception of C++ passes: tables for those are left out."""
+
+    def setup_function(self, descriptor: Any) -> None:
+        super().setup_function(descriptor)
+        self.function.attributes.add("nounwind")
+
+
+class _CalledLower(_Lower):
     """Lowers a function that may not be inlined into its callers."""
 
     def setup_function(self, descriptor: Any) -> None:
@@ -124,11 +132,10 @@ class _KernelLibrary(_Library):
         What is linked in becomes private: a function with one call is inlined whatever its size, and an unused
         argument, such as most arrays of a table, is not passed. It gets a name of its own, since the linker would take
         it for stock numba's version of the same function, and finds no address. Constants, and the addresses of those
-        that are empty, become private too: no name of them is in the object file. No exception passes these functions.
+        that are empty, become private too: no name of them is in the object file.
         """
         module, kept = self._final_module, set()
         for number, function in enumerate(module.functions):
-            function.add_function_attribute("nounwind")
             if function.linkage == llvmlite.binding.Linkage.linkonce_odr:
                 function.linkage, function.name = "private", f"inner.{number}"
             else:
@@ -173,6 +180,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
     in, without machine code of its own."""
 
     _name = "engine_kernel_lowering"
+    lowering_class = _Lower
 
     def run_pass(self, state: Any) -> bool:
         context, codegen = state.targetctx, state.targetctx.codegen()

@@ -54,15 +54,23 @@ def _stamps() -> dict[str, tuple[int, ...]]:
 
 
 def _has_changed(spec: ModuleSpec) -> bool:
-    """Return whether the file of a module has changed since the engine was imported."""
+    """Return whether the file of a module has changed since the engine was imported, and may be imported so. Caller
+    has read the source: what was imported before is of that source from now on."""
+    if spec.name in _imported_as_read:
+        return False
     path = getattr(spec.loader, "archive", None) or spec.origin or ""
     try:
         stamp = _stamp(path)
     except OSError:
         return path in _AT_IMPORT
-    return _AT_IMPORT.setdefault(path, stamp) != stamp
+    if _AT_IMPORT.setdefault(path, stamp) != stamp:
+        return True
+    if spec.name in sys.modules:
+        _imported_as_read.add(spec.name)
+    return False
 
 
+_imported_as_read: set[str] = set()
 _AT_IMPORT = _stamps()
 
 
