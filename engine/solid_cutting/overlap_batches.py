@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import partial
-from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -31,7 +30,9 @@ from engine.polygon_overlay.pair_arrays import PolygonSelection, arrays_of
 from engine.predicates.rational import nearest_float, nearest_pair
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
-from engine.solid_cutting.convex_pairs import CORNER, PLACED, PLANE, overlap_bodies
+from engine.solid_cutting.convex_bodies import PLACED, PLANE
+from engine.solid_cutting.convex_edges import SPOT
+from engine.solid_cutting.convex_pairs import CORNER, Scratch, overlap_bodies
 from engine.solid_cutting.convex_rings import MOST_CORNERS, overlap_rings, turn_boxes
 from engine.solid_cutting.exact_measures import faces_of_half_spaces
 from engine.solids.base import Solid
@@ -43,20 +44,33 @@ from engine.solids.pose import Pose
 from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import FloatArray, IntArray, read_only
 
-_QUADS: Final = BOX_TRIANGLES.reshape(6, 6)[:, [0, 1, 2, 5]].ravel()
-"""Faces of a box, corner k of which is at the high end of axis a if bit a of k is set."""
-_QUAD_ENDS: Final = np.arange(0, 25, 4)
-_HIGH: Final = np.arange(8)[:, None] >> np.arange(3) & 1
+_HIGH: Final = np.arange(8)[:, None] >> np.arange(3) & 1, np.arange(3)
+"""Corner k of a box is at the high end of axis a if bit a of k is set."""
 _LARGEST: Final = 1 << 16
 """Faces times corners of a pair up to which tables are made of it."""
+_FEW: Final = 64
+"""Pairs up to which they are not divided."""
 
 
 class Body(NamedTuple):
-    """A convex body: corners (n, 6), high parts and low parts; faces, one after another, and where each ends."""
+    """A convex body: corners (n, 6), high parts and low parts; faces, one after another, by these; where each begins,
+    and the last ends; and for each corner of a face the face beyond the edge that begins there."""
 
     points: FloatArray
     corners: IntArray
-    ends: IntArray
+    rings: IntArray
+    twins: IntArray
+
+
+def _body_with(points: FloatArray, faces: list[IntArray]) -> Body:
+    corners, sizes = np.concatenate(faces), [*map(len, faces)]
+    ends = np.concatenate([np.roll(ring, -1) for ring in faces])
+    twins = np.empty_like(corners)
+    twins[np.lexsort((corners, ends))] = np.repeat(np.arange(len(faces)), sizes)[np.lexsort((ends, corners))]
+    return Body(points, corners, np.cumsum([0, *sizes]), twins)
+
+
+_BOX: Final = _body_with(np.zeros((8, 6)), list(BOX_TRIANGLES.reshape(6, 6)[:, [0, 1, 2, 5]]))
 
 
 def of_bodies(
@@ -65,54 +79,57 @@ def of_bodies(
     """Return the common volumes, or ratios, of those pairs of solids that are convex bodies of space, proven to be the
     nearest doubles, NaN of others. poses: of all first, and of all second ones, or lists of one a pair."""
     values = np.full(len(pairs), np.nan)
-    unique = {id(solid): solid for pair in pairs for solid in pair}
-    boxes = [solid for solid in unique.values() if isinstance(solid, Aabb) and solid.dimension == 3]
-    numbers = {id(box): number for number, box in enumerate(boxes)}
-    bodies: list[Body] = []
-    for key, solid in unique.items():
-        if isinstance(solid, (Convex, Polyhedron)) and solid.dimension == 3:
-            budget.check()
+    unique = {id(solid): solid for pair in pairs for solid in pair if solid.dimension == 3}
+    boxes = [(key, solid) for key, solid in unique.items() if isinstance(solid, Aabb)]
+    forms, keys = [_BOX] if boxes else [], [key for key, _ in boxes]
+    for number, (key, solid) in enumerate(unique.items()):
+        if isinstance(solid, (Convex, Polyhedron)):
+            if number % _FEW == 0:
+                budget.check()
             body = solid.prepared("overlap_body", partial(_body_of, solid, budget), budget.check)
             if body is not None:
-                numbers[key] = len(boxes) + len(bodies)
-                bodies.append(body)
+                keys.append(key)
+                forms.append(body)
+    numbers = {key: number for number, key in enumerate(keys)}
     places = [(numbers.get(id(one), -1), numbers.get(id(other), -1)) for one, other in pairs]
     rows = [row for row, place in enumerate(places) if min(place) >= 0]
     if not rows:
         return values
-    n, n_corners, n_faces = len(boxes), 8 * len(boxes), 6
-    table, corners, ends = [(8 * k, 0, 8, 6) for k in range(n)], [_QUADS], [_QUAD_ENDS]
-    for body in bodies:
-        table.append((n_corners, n_faces, len(body.points), len(body.ends)))
-        corners.append(body.corners)
-        ends.append(body.ends + int(ends[-1][-1]))
-        n_corners, n_faces = n_corners + len(body.points), n_faces + len(body.ends)
-    points = np.zeros((n_corners, 6))
-    if n:
-        points[: 8 * n, :3] = np.array([[box.min, box.max] for box in boxes])[:, _HIGH, range(3)].reshape(-1, 3)
-    for body, row in zip(bodies, table[n:]):
-        points[row[0] : row[0] + row[2]] = body.points
-    sizes = np.array(table, np.int64)
-    most, most_faces = sizes[:, 2:].max(axis=0).tolist()
+    bodies, at = [(8 * k, 0, 8, 6, 0) for k in range(len(boxes))], [8 * len(boxes), 7, 24] if boxes else [0, 0, 0]
+    corners_of_boxes = np.zeros((at[0], 6))
+    if boxes:  # which have one table of faces
+        ends = np.array([(box.min, box.max) for _, box in boxes])
+        corners_of_boxes[:, :3] = ends[:, *_HIGH].reshape(-1, 3)
+    for body in forms[1:] if boxes else forms:
+        bodies.append((at[0], at[1], len(body.points), len(body.rings) - 1, at[2]))
+        at = [at[0] + len(body.points), at[1] + len(body.rings), at[2] + len(body.corners)]
+    most, most_sides, most_faces, _ = (max(map(len, arrays)) for arrays in zip(*forms))
     if most * most_faces > _LARGEST:
         return values
-    which, moves = np.zeros((len(rows), 4), np.int64), list[list[float]]()
-    which[:, :2] = [places[row] for row in rows]
+    moves: list[list[float]] = []
+    which = [[places[row][k] for row in rows] for k in range(2)]
     for k, pose in enumerate(poses):
         chosen = rows if isinstance(pose, list) else rows[:1]
-        which[:, 2 + k] = len(moves) + np.arange(len(rows)) if len(chosen) > 1 else len(moves)
+        which.append([len(moves) + (row if len(chosen) > 1 else 0) for row in range(len(rows))])
         moves += [_numbers_of(pose, pairs[row][k], k, row) for row in chosen]
-    tables = [read_only(each) for each in (points, np.concatenate(corners), np.concatenate(ends), sizes)]
-    some, turns = read_only(which), np.array(moves)
-    made = np.full(len(rows), np.nan)
+    joined = [np.concatenate(arrays) for arrays in zip(*forms)]
+    points = np.concatenate([corners_of_boxes, joined[0][len(_BOX.points) * (len(boxes) > 0) :]])
+    tables = [read_only(each) for each in (points, *joined[1:], np.array(bodies))]
+    some, turns, made = np.array(which).T.copy(), np.array(moves), np.full(len(rows), np.nan)
+    shapes = ((2, most, PLACED), (2, most_faces, PLANE), (2, most, most_faces), (2, most + most_faces + 8, CORNER),
+              (2 * (most + most_sides), SPOT), (2, most_faces, 3))  # fmt: skip
 
     def fill(start: int, stop: int) -> None:
-        scratch = [np.empty((2, most, PLACED)), np.empty((2, most_faces, PLANE))]
-        scratch += [np.empty((2, most_faces, most)), np.empty((2, most + most_faces + 8, CORNER))]
-        out = made[start:stop]
-        entry_of(overlap_bodies)(*tables, some[start:stop], turns, is_ratio, *scratch, out, budget.flag)
+        scratch: Any = (*map(np.empty, shapes), np.empty((most_faces, most_faces, 2), np.int64))
+        entry_of(overlap_bodies)(
+            *tables, read_only(some[start:stop]), turns, is_ratio, Scratch(*scratch), made[start:stop], budget.flag
+        )
 
-    run_chunks(fill, len(rows), budget=budget, workers=workers, first_chunk=64)
+    if len(rows) <= _FEW:
+        fill(0, len(rows))
+        budget.check()
+    else:
+        run_chunks(fill, len(rows), budget=budget, workers=workers, first_chunk=_FEW)
     values[rows] = made
     return values
 
@@ -138,7 +155,7 @@ def _body_of(solid: Convex | Polyhedron, budget: Budget) -> Body | None:
         used, faces = np.unique(solid.triangles, return_inverse=True)
         faces = faces.reshape(-1, 3) if certificate.is_outward else faces.reshape(-1, 3)[:, ::-1]
         points = np.concatenate([solid.vertices[used], np.zeros((len(used), 3))], axis=1)
-        return Body(points, faces.ravel(), np.arange(3, 3 * len(faces) + 1, 3))
+        return _body_with(points, list(faces))
     try:
         made = faces_of_half_spaces(solid.planes.tolist(), budget)
     except UnsupportedSolidError:  # it is not bounded
@@ -147,9 +164,8 @@ def _body_of(solid: Convex | Polyhedron, budget: Budget) -> Body | None:
         return None
     mesh, fans = made
     rounded = np.array([[nearest_pair(x, mesh.w) for x in point] for point in mesh.points])
-    rings = [[fan[0][0], fan[0][1], *(triangle[2] for triangle in fan)] for fan in fans]
-    points = np.concatenate([rounded[:, :, 0], rounded[:, :, 1]], axis=1)
-    return Body(points, np.array(list(chain(*rings))), np.cumsum([len(ring) for ring in rings]))
+    rings = [np.array([fan[0][0], fan[0][1], *(triangle[2] for triangle in fan)]) for fan in fans]
+    return _body_with(np.concatenate([rounded[:, :, 0], rounded[:, :, 1]], axis=1), rings)
 
 
 _BOX_NUMBERS: Final = 5
