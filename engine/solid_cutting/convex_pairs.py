@@ -19,8 +19,8 @@ the area of the strip is below 24 e F^2 / (max w - min w), if that range exceeds
 was wrong before is cut too, and does not grow. What corners and sums are rounded by is below 320 u^2 D F + 8 eta F a
 corner, in twice the area.
 
-The double nearest to the result is certain where the bound says so; else the pair is NaN. A result of zero takes a
-plane between both, that of a face or through an edge of each.
+The double nearest to the result is certain where the bound says so; else the pair is NaN. A result of zero takes a face
+of one with all of the other beside it, or no edge of one in the other.
 
 Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974; S. Gottschalk, Separating axis theorem, 1996.
 """
@@ -153,41 +153,6 @@ def _add_faces(
     return True
 
 
-@inline
-def _reach(placed: FloatArray, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return the least and the largest dot product of the direction (x, y, z) with corners `placed` (n, 6), rounded."""
-    low = high = x * placed[0, 0] + y * placed[0, 1] + z * placed[0, 2]
-    for k in range(1, placed.shape[0]):
-        at = x * placed[k, 0] + y * placed[k, 1] + z * placed[k, 2]
-        low, high = min(low, at), max(high, at)
-    return low, high
-
-
-@called
-def _has_axis(own: Body, other: Body, margin: float) -> bool:
-    """Return whether the cross product of an edge of each body certainly separates the two. margin: bound on the error
-    of a dot product with a direction, relative to its size."""
-    p, q = own.placed, other.placed
-    for ring in range(own.planes.shape[0]):
-        for start in range(own.rings[ring], own.rings[ring + 1]):
-            a, b = own.corners[start], own.corners[start + 1 if start + 1 < own.rings[ring + 1] else own.rings[ring]]
-            for their in range(other.planes.shape[0]):
-                for k in range(other.rings[their], other.rings[their + 1]):
-                    c = other.corners[k]
-                    d = other.corners[k + 1 if k + 1 < other.rings[their + 1] else other.rings[their]]
-                    if b < a or d < c:
-                        continue
-                    ux, uy, uz = p[b, 0] - p[a, 0], p[b, 1] - p[a, 1], p[b, 2] - p[a, 2]
-                    vx, vy, vz = q[d, 0] - q[c, 0], q[d, 1] - q[c, 1], q[d, 2] - q[c, 2]
-                    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-                    low, high = _reach(p, nx, ny, nz)
-                    other_low, other_high = _reach(q, nx, ny, nz)
-                    gap = max(other_low - high, low - other_high)
-                    if gap > margin * (abs(nx) + abs(ny) + abs(nz)):
-                        return True
-    return False
-
-
 @called
 def _value_of_pair(
     own: Body, other: Body, polygons: FloatArray, parts: Parts, errors: tuple[float, float], is_ratio: bool,
@@ -226,8 +191,6 @@ def _value_of_pair(
         return float("nan")
     if not _add_faces(other, own, polygons, (span, eta, False), sums):
         return float("nan")
-    if not abs(sums[0]) > sums[2]:
-        return 0.0 if _has_axis(own, other, margin) else float("nan")
     return certified(sums, 6.0, is_ratio)
 
 
