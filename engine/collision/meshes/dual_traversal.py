@@ -53,13 +53,14 @@ PIERCING = SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
 (second) body, a surface, passes through the interior of the other; any contact; a crossing that proves overlapping
 interiors, and so parts of either body outside the other."""
 
-DONE, SETTLED, FULL, INTERRUPTED = range(4)
+DONE, SETTLED, FULL, INTERRUPTED, PAUSED = range(5)
 """| outcome | meaning |
 |---|---|
 | DONE | all pairs seen |
 | SETTLED | the pair in row 0 decides the query |
 | FULL | more pairs than room |
 | INTERRUPTED | the flag was set |
+| PAUSED | as many pairs as the caller wanted to look at first |
 """
 ROOM = 4096
 """Number of pairs of faces in contact for which work space has room; more are rare."""
@@ -257,12 +258,26 @@ def pop_lowest_bit(low: int, high: int) -> tuple[int, int, int]:
     return 32 + lowest_bit(high), low, high & (high - 1)
 
 
+class Progress(NamedTuple):
+    """Where a search is: the height of its stack, and of the leaf blocks i and j the mask of pairs of faces still to be
+    classified, in two 32-bit halves, bit 8 k + m for lane k of i and lane m of j."""
+
+    n_stack: int
+    i: int
+    j: int
+    low: int
+    high: int
+
+
+START = Progress(-1, 0, 0, 0, 0)
+
+
 @merged
-def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int]:
-    """Classify pairs of faces of the leaf blocks i and j, and append those in contact to ``s.contacts``. low, high:
-    mask of the pairs in two 32-bit halves, bit 8 k + m for lane k of i and lane m of j; n_pairs: number listed so far.
-    Returns the outcome (DONE, SETTLED, FULL or INTERRUPTED) and the new number of pairs."""
+def classify_faces(s: Search, at: Progress, n_pairs: int, pause: int) -> tuple[int, int, Progress]:
+    """Classify pairs of faces, those that `at` names, and append those in contact to ``s.contacts``. n_pairs: number
+    listed so far; pause: number at which to pause. Returns the outcome, the new number of pairs, and what is left."""
     pairs, kinds, met = s.contacts
+    n_stack, i, j, low, high = at
     room = capacity_of(s.contacts)
     while low != 0 or high != 0:  # bound: each turn takes a bit
         bit, low, high = pop_lowest_bit(low, high)
@@ -286,15 +301,17 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
             continue
         if kind != UNDECIDED and is_decisive(s, kind, i_face, j_face):
             pairs[0, 0], pairs[0, 1], kinds[0] = i_face, j_face, kind
-            return SETTLED, 1
+            return SETTLED, 1, at
         if n_pairs < room:
             pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
         n_pairs += 1
         if n_pairs > room:
-            return FULL, n_pairs
+            return FULL, n_pairs, at
         if s.flag[0] != 0:
-            return INTERRUPTED, n_pairs
-    return DONE, n_pairs
+            return INTERRUPTED, n_pairs, at
+        if n_pairs == pause:
+            return PAUSED, n_pairs, Progress(n_stack, i, j, low, high)
+    return DONE, n_pairs, Progress(n_stack, 0, 0, 0, 0)
 
 
 @merged
@@ -349,30 +366,35 @@ def are_parted(s: Search, i: int, j: int, n_stack: int) -> bool:
 
 
 @merged
-def search(s: Search) -> tuple[int, int]:
-    """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...) and the number of pairs,
-    which may exceed the room. SETTLED: the one pair that decides the query stands in row 0."""
-    stack = s.descent.stack
-    stack[0, 0], stack[0, 1] = 0, 0
-    n_stack, n_pairs, n_blocks, next_try = 1, 0, 0, _N_BLOCKS
-    while n_stack > 0:  # bound: each pair of nodes enters once
+def search(s: Search, start: Progress, n_pairs: int, pause: int) -> tuple[int, int, Progress]:
+    """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...), the number of pairs, which
+    may exceed the room, and how far the search is. SETTLED: the one pair that decides the query stands in row 0. start:
+    START, or where a search paused that had listed n_pairs; pause: number of pairs at which to pause."""
+    stack, at, n_blocks, next_try = s.descent.stack, start, 0, _N_BLOCKS
+    if at.n_stack < 0:
+        stack[0, 0], stack[0, 1] = 0, 0
+        at = Progress(1, 0, 0, 0, 0)
+    while at.n_stack > 0 or at.low != 0 or at.high != 0:  # bound: each pair of nodes enters once
         if s.flag[0] != 0:
-            return INTERRUPTED, n_pairs
-        n_stack -= 1
-        i, j = int(stack[n_stack, 0]), int(stack[n_stack, 1])
-        if n_blocks >= next_try and s.first.child[i, 0] >= 0 and s.second.child[j, 0] >= 0:
-            if next_try == _N_BLOCKS and n_pairs == 0 and are_parted(s, 0, 0, n_stack):
-                return DONE, 0
-            next_try = max(n_blocks, _N_BLOCKS + 1)
-            if are_parted(s, i, j, n_stack):
-                continue
-            next_try = n_blocks + _N_MORE
-        n_stack, low, high = expand_pair(s, i, j, n_stack)
-        if low != 0 or high != 0:
+            return INTERRUPTED, n_pairs, at
+        if at.low == 0 and at.high == 0:
+            n_stack = at.n_stack - 1
+            i, j = int(stack[n_stack, 0]) + 0, int(stack[n_stack, 1]) + 0  # as 64 bits
+            if n_blocks >= next_try and s.first.child[i, 0] >= 0 and s.second.child[j, 0] >= 0:
+                if next_try == _N_BLOCKS and n_pairs == 0 and are_parted(s, 0, 0, n_stack):
+                    return DONE, 0, at
+                next_try = max(n_blocks, _N_BLOCKS + 1)
+                if are_parted(s, i, j, n_stack):
+                    at = Progress(n_stack, 0, 0, 0, 0)
+                    continue
+                next_try = n_blocks + _N_MORE
+            n_stack, low, high = expand_pair(s, i, j, n_stack)
+            at = Progress(n_stack, i, j, low, high)
+        if at.low != 0 or at.high != 0:
             n_blocks += 1
-            how, n_pairs = classify_faces(s, i, j, low, high, n_pairs)
+            how, n_pairs, at = classify_faces(s, at, n_pairs, pause)
             if how != DONE:
-                return how, n_pairs
+                return how, n_pairs, at
     pairs, kinds, _ = s.contacts
     room = capacity_of(s.contacts)
     for row in range(room, kinds.shape[0]):  # the pairs that name the witness
@@ -380,4 +402,4 @@ def search(s: Search) -> tuple[int, int]:
             if n_pairs < room:
                 pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = pairs[row, 0], pairs[row, 1], kinds[row]
             n_pairs += 1
-    return DONE, n_pairs
+    return DONE, n_pairs, at

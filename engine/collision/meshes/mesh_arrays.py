@@ -99,15 +99,16 @@ class MeshBody:
 
 def mesh_body_of(solid: Solid) -> MeshBody:
     """Return the mesh of a polyhedron, surface or 3D box, built at the first call and cached with the solid."""
+    cached: MeshBody | None = solid.cached("mesh_body")
+    return solid.prepared("mesh_body", lambda: _built(solid)) if cached is None else cached
 
-    def build() -> MeshBody:
-        if isinstance(solid, Aabb):
-            return mesh_body_of_triangles(*_box_triangles(solid), bool((solid.min < solid.max).all()))
-        assert isinstance(solid, Mesh)
-        given = solid.vertices, solid.triangles, solid.triangle_faces
-        return mesh_body_of_triangles(*given, isinstance(solid, Polyhedron))
 
-    return solid.prepared("mesh_body", build)
+def _built(solid: Solid) -> MeshBody:
+    if isinstance(solid, Aabb):
+        return mesh_body_of_triangles(*_box_triangles(solid), bool((solid.min < solid.max).all()))
+    assert isinstance(solid, Mesh)
+    given = solid.vertices, solid.triangles, solid.triangle_faces
+    return mesh_body_of_triangles(*given, isinstance(solid, Polyhedron))
 
 
 def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:

@@ -154,25 +154,21 @@ def relate_poses(
     set."""
     first_stage = 0 if len(contacts.met) == 0 and n_named >= 0 and seek != dual.SEEK_CONTACT else 2
     are_few = first.faces.shape[0] * second.faces.shape[0] <= FEW
-    few = dual.Contacts(contacts.pairs[:N_FACES], contacts.kinds[:N_FACES], contacts.met)
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
         place, is_apart = dual.place_bodies(first, still, 0, second, poses, item, descent)
         s = dual.Search(first, second, place, descent, seek, contacts, flag)
-        how, n_pairs, is_parted, is_done = dual.DONE, n_known, False, n_known > 0 or is_apart
-        for stage in range(first_stage, 3):  # one contact, then a few: a plane at them may separate the bodies
-            if is_done or (stage == 1 and are_few):
-                continue
-            goal = dual.SEEK_CONTACT if stage == 0 else seek
-            how, n_pairs = dual.search(
-                dual.Search(first, second, place, descent, goal, few if stage == 1 else contacts, flag)
-            )
-            is_done = stage == 2 or how != (dual.SETTLED if stage == 0 else dual.FULL)
-            if not is_done and contacts.kinds[0] != CROSSING:
-                is_done = is_parted = touches_apart(s, min(n_pairs, len(few.kinds)), n_named > 0, row)
-            elif stage == 0 and not is_done:
-                is_done = dual.is_decisive(s, CROSSING, contacts.pairs[0, 0], contacts.pairs[0, 1])
+        how, n_pairs, at = dual.PAUSED, n_known, dual.START
+        if n_known > 0 or is_apart:
+            how = dual.DONE
+        is_parted, stage = False, first_stage
+        while how == dual.PAUSED and not is_parted:  # bound: 3; a plane at one contact, then at a few, may separate
+            pause = 1 if stage == 0 else (N_FACES if stage == 1 and not are_few else -1)
+            how, n_pairs, at = dual.search(s, at, n_pairs, pause)
+            if how == dual.PAUSED and contacts.kinds[0] != CROSSING:
+                is_parted = touches_apart(s, n_pairs, n_named > 0, row)
+            stage += 1
         row[N_CONTACTS] = 1 if is_parted else n_pairs
         if how == dual.INTERRUPTED:
             return

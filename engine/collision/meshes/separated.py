@@ -191,9 +191,9 @@ N_FACES = 32
 @allocating
 def touches_apart(s: dual.Search, n: int, is_named: bool, row: IntArray) -> bool:
     """Fill the row (N_COLUMNS,) of a pair that touches, if a plane separates the bodies: that of a face in the first n
-    of ``s.contacts``, or one through a common corner of the first; return whether it is filled, the witness included if
-    is_named."""
-    if _touches_at_corner(s, s.contacts.pairs[0, 0], s.contacts.pairs[0, 1], is_named, row):
+    of ``s.contacts``, or of one contact alone, a plane through a common corner; return whether it is filled, the
+    witness included if is_named."""
+    if n == 1 and _touches_at_corner(s, s.contacts.pairs[0, 0], s.contacts.pairs[0, 1], is_named, row):
         return True
     at = separating_contact(s, n)
     if at >= 0 and not is_named:
@@ -205,17 +205,32 @@ def touches_apart(s: dual.Search, n: int, is_named: bool, row: IntArray) -> bool
 
 @called
 def separating_contact(s: dual.Search, n: int) -> int:
-    """Return which of the first n contacts has a face whose plane is proven to separate the bodies, -1 for none."""
-    poses, error, (u, v) = s.descent.poses, dual.exact_error(s), _vertices_of(s)
+    """Return which of the first n contacts has a face whose plane is proven to separate the bodies, -1 for none. If
+    faces share an area, only those are tried."""
+    poses, error, (u, v), kinds = s.descent.poses, dual.exact_error(s), _vertices_of(s), s.contacts.kinds
+    are_flush = False
     for item in range(n):
+        are_flush |= kinds[item] == COMMON_AREA
+    for item in range(n):
+        if are_flush and kinds[item] != COMMON_AREA:
+            continue
         i, j = s.contacts.pairs[item, 0], s.contacts.pairs[item, 1]  # most planes cut the other body
-        if separates(poses, facet_of(s.first, u, i), v, u, error):
+        if not _is_tried(s.contacts.pairs, item, 0) and separates(poses, facet_of(s.first, u, i), v, u, error):
             return item
-        if separates(poses, facet_of(s.second, v, j), u, v, error):
+        if not _is_tried(s.contacts.pairs, item, 1) and separates(poses, facet_of(s.second, v, j), u, v, error):
             return item
         if s.flag[0] != 0:
             break
     return -1
+
+
+@inline
+def _is_tried(pairs: IntArray, row: int, column: int) -> bool:
+    """Return whether a row above has the same face in a column."""
+    before = 0
+    while before < row and pairs[before, column] != pairs[row, column]:  # bound: row
+        before += 1
+    return before < row
 
 
 @inline
@@ -266,8 +281,10 @@ def _is_only_common_point(s: dual.Search, p: int, q: int, common: Point3) -> boo
 
     A vector v between placed points is off by 2 `error` a coordinate, and by u of itself; n . v of three products by
     less than 4 u |n|_1 |v| more: 2^-50 |n|_1 |v| and 2 |n|_1 error in all, of which twice is allowed."""
-    n, error = Point3(0.0, 0.0, 0.0), s.place.error
-    for _ in range(_TURNS):
+    n, error, n_wrong = Point3(0.0, 0.0, 0.0), s.place.error, 0
+    for turn in range(_TURNS):
+        if turn > 1 and 8 * n_wrong > s.first.vertices.shape[0] + s.second.vertices.shape[0]:
+            return False
         n_wrong = 0
         for own in range(2):
             mesh, place, apex = (s.first, s.place.a, p) if own == 0 else (s.second, s.place.b, q)
@@ -299,7 +316,9 @@ def _touches_in_planes(s: dual.Search, at: int, row: IntArray, own: Live, their:
     for kind in range(contact.VERTEX_VERTEX + 1):
         if best < kind:
             break
-        if kind == contact.EDGE_FACE and _keep_in_planes(s, -1, -1, own, their):  # more planes leave less to search
+        if (
+            are_few and kind == contact.EDGE_FACE and _keep_in_planes(s, -1, -1, own, their)
+        ):  # more planes leave less to search
             n_own, n_their = _list_faces(s.first, own), _list_faces(s.second, their)
         for a in range(n_own):
             i, count = own.faces[a], own.counts[a]
