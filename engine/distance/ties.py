@@ -62,7 +62,8 @@ def nearest_between_walls(bodies: tuple[ExactBody, ExactBody], pairs: IntArray, 
 def _heights(body: ExactBody, wall: Wall) -> Any:
     """Return an array (n,) of integers: how far the vertices of a body lie before a wall, 0 on it, negative beyond."""
     n, at, size = wall
-    return body.vertices() @ np.array(n, object) * size - at
+    axes = [axis for axis in range(3) if n[axis]]
+    return body.vertices(axes) @ np.array([n[axis] * size for axis in axes], object) - at
 
 
 def _on_wall(body: ExactBody, is_on: BoolArray, axes: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -22,7 +22,7 @@ from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corne
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.parity import SIDE_UNKNOWN, inner_side, proves_overlap, state_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
-from engine.collision.meshes.separating_planes import Vertices, nodes_are_separated
+from engine.collision.meshes.separating_planes import Vertices, blocks_part, nodes_are_separated
 from engine.collision.meshes.triangle_triangle import (
     APART,
     COMMON_AREA,
@@ -64,9 +64,10 @@ DONE, SETTLED, FULL, INTERRUPTED, PAUSED = range(5)
 """
 ROOM = 4096
 """Number of pairs of faces in contact for which work space has room; more are rare."""
-_N_BLOCKS, _N_MORE = 1024, 64
-"""After so many pairs of blocks whose faces were classified, planes of faces are tried (`separating_planes.py`); after
-a try that separates nothing, again after so many more."""
+_N_FIRST, _N_BLOCKS, _N_MORE = 64, 1024, 64
+"""After so many pairs of blocks whose faces were classified, and no contact, planes of the last ones are tried on the
+bodies; after so many, planes of faces (`separating_planes.py`); after a try that separates nothing, again after so many
+more."""
 
 STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH + STACK
 """Bound on the pairs of nodes on the stack: a pair is replaced by at most 64, one of its nodes a level deeper."""
@@ -355,12 +356,25 @@ def pose_number(s: Search, place: Placement, number: int) -> int:
     return UNPOSED if s.place.error == 0.0 or not place.is_posed else number
 
 
+@inline
+def vertices_of(s: Search) -> tuple[Vertices, Vertices]:
+    """Return the vertices of both bodies as input of exact signs."""
+    u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
+    return u, Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
+
+
+@called
+def are_parted_by_blocks(s: Search, i: int, j: int) -> bool:
+    """Return whether the plane of a face of leaf block i of the first or j of the second tree parts the bodies."""
+    u, v = vertices_of(s)
+    return blocks_part(s.descent.poses, s.first, u, i, s.second, v, j, exact_error(s))
+
+
 @called
 def are_parted(s: Search, i: int, j: int, n_stack: int) -> bool:
     """Return whether the plane of some face separates all faces below node i of the first tree from all below node j of
     the second. n_stack: pairs on the stack of the search, whose free rows are scratch."""
-    u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
-    v = Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
+    u, v = vertices_of(s)
     free = s.descent.stack[n_stack:]
     return nodes_are_separated(s.descent.poses, s.first, u, i, s.second, v, j, free, exact_error(s))
 
@@ -392,6 +406,8 @@ def search(s: Search, start: Progress, n_pairs: int, pause: int) -> tuple[int, i
             at = Progress(n_stack, i, j, low, high)
         if at.low != 0 or at.high != 0:
             n_blocks += 1
+            if n_blocks == _N_FIRST and n_pairs == 0 and are_parted_by_blocks(s, at.i, at.j):
+                return DONE, 0, at
             how, n_pairs, at = classify_faces(s, at, n_pairs, pause)
             if how != DONE:
                 return how, n_pairs, at

@@ -82,17 +82,23 @@ class ExactBody:
             self._vertices[index] = point
         return point
 
-    def vertices(self) -> Any:
-        """Return all vertices under the pose, in units of the lattice: an array (n, 3) of Python's integers."""
+    def vertices(self, axes: list[int]) -> Any:
+        """Return the coordinates of all vertices along some axes, under the pose, in units of the lattice: an array
+        (n, len(axes)) of Python's integers."""
         shift = self.shift if self._rotation is None else self.shift - self._r_shift
-        points = self.mesh.arrays.vertices
+        rows = [[int(axis == k) for k in range(3)] for axis in axes]
+        if self._rotation is not None:
+            rows = [list(self._rotation[axis]) for axis in axes]
+        read = [k for k in range(3) if any(row[k] for row in rows)]
+        points = self.mesh.arrays.vertices[:, read]
         if self.mesh.arrays.extent.reach < math.ldexp(1.0, 1000 - shift):
             whole = np.frompyfunc(int, 1, 1)(np.ldexp(points, shift))
         else:
             whole = np.array([[on_lattice(x, shift) for x in point] for point in points.tolist()], object)
         if self._rotation is None:
             return whole
-        return whole @ np.array(self._rotation, object).T + np.array(self._translation, object)
+        moves = np.array([self._translation[axis] for axis in axes], object)
+        return whole @ np.array([[row[k] for k in read] for row in rows], object).T + moves
 
     def corners(self, face: int) -> Corners:
         """Return the three corners of a triangle under the pose, in units of the lattice."""

@@ -87,7 +87,7 @@ def _keep_in_planes(s: dual.Search, i: int, j: int, own: Live, their: Live) -> b
     """Clear the vertices that lie off a plane that separates the bodies from ``own.vertices`` and ``their.vertices``;
     return whether there is such a plane. Planes tried: those of face i of the first and face j of the second body; if i
     is negative, those of all faces with a live corner."""
-    poses, error, is_parted, (u, v) = s.descent.poses, dual.exact_error(s), False, _vertices_of(s)
+    poses, error, is_parted, (u, v) = s.descent.poses, dual.exact_error(s), False, dual.vertices_of(s)
     n_first = s.first.faces.shape[0]
     for item in range(2 if i >= 0 else n_first + s.second.faces.shape[0]):
         is_own = item == 0 if i >= 0 else item < n_first
@@ -207,7 +207,7 @@ def touches_apart(s: dual.Search, n: int, is_named: bool, row: IntArray) -> bool
 def separating_contact(s: dual.Search, n: int) -> int:
     """Return which of the first n contacts has a face whose plane is proven to separate the bodies, -1 for none. If
     faces share an area, only those are tried."""
-    poses, error, (u, v), kinds = s.descent.poses, dual.exact_error(s), _vertices_of(s), s.contacts.kinds
+    poses, error, (u, v), kinds = s.descent.poses, dual.exact_error(s), dual.vertices_of(s), s.contacts.kinds
     are_flush = False
     for item in range(n):
         are_flush |= kinds[item] == COMMON_AREA
@@ -231,13 +231,6 @@ def _is_tried(pairs: IntArray, row: int, column: int) -> bool:
     while before < row and pairs[before, column] != pairs[row, column]:  # bound: row
         before += 1
     return before < row
-
-
-@inline
-def _vertices_of(s: dual.Search) -> tuple[Vertices, Vertices]:
-    """Return the vertices of both bodies as input of exact signs."""
-    u = Vertices(s.first.vertices, s.place.a, dual.pose_number(s, s.place.a, 0))
-    return u, Vertices(s.second.vertices, s.place.b, dual.pose_number(s, s.place.b, 1))
 
 
 @called

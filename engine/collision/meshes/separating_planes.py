@@ -76,6 +76,29 @@ def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: 
     return side != their_side
 
 
+@called
+def blocks_part(
+    poses: FloatArray, first: MeshArrays, u: Vertices, i: int, second: MeshArrays, v: Vertices, j: int, error: float
+) -> bool:
+    """Return whether the plane of a face of leaf block i of the first tree or j of the second separates the bodies, and
+    the other body does not touch it, so that they have no common point."""
+    for item in range(2 * LANES):
+        mesh, own, other, node = (first, u, v, i) if item < LANES else (second, v, u, j)
+        entry = int(mesh.child[node, item % LANES])
+        if entry != EMPTY and separates(poses, facet_of(mesh, own, -1 - entry), other, own, error):
+            return _touches_nowhere(poses, facet_of(mesh, own, -1 - entry), other, error)
+    return False
+
+
+@inline
+def _touches_nowhere(poses: FloatArray, plane: Facet, v: Vertices, error: float) -> bool:
+    """Return whether no vertex of a body lies in the plane through the corners of `plane`."""
+    for vertex in range(v.points.shape[0]):
+        if sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error) == 0:
+            return False
+    return True
+
+
 @inline
 def facet_of(mesh: MeshArrays, v: Vertices, face: int) -> Facet:
     """Return a face as input of exact signs; v: the vertices of its body."""

@@ -107,3 +107,16 @@ def test_apex_on_a_plate_of_many_faces() -> None:
         assert (found.witness.kind, found.witness.first_face, found.witness.second_face) == strongest(
             plate, cone, (None, move)
         )
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0), (0.3, 0.1)])
+def test_plates_with_little_between_them(at: tuple[float, float]) -> None:
+    plate, gap = block(20, 16, 7), 2.0**-30
+    move = Pose(np.eye(3), [*at, 1.0 + gap])
+    assert collide(plate, plate, second_pose=move).relation == Relation.DISJOINT
+    for low, expected in ((gap, Relation.TOUCHING), (gap / 2, Relation.DISJOINT), (2 * gap, Relation.OVERLAPPING)):
+        vertices = plate.vertices.copy()
+        vertices[8 * 17 + 8] -= [0, 0, low]  # one vertex of the lower side nearer
+        bent = Polyhedron(vertices, plate.triangles)
+        assert collide(plate, bent, second_pose=move).relation == expected
+        assert collide(bent, plate, first_pose=move).relation == expected
