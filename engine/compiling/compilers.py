@@ -134,15 +134,15 @@ class _KernelLibrary(_Library):
         it for stock numba's version of the same function, and finds no address. Constants, and the addresses of those
         that are empty, become private too: no name of them is in the object file.
         """
-        module, kept = self._final_module, set()
+        module, named = self._final_module, set()
         for number, function in enumerate(module.functions):
             if function.linkage == llvmlite.binding.Linkage.linkonce_odr:
                 function.linkage, function.name = "private", f"inner.{number}"
             else:
-                kept.add(f"{_CONSTANTS}{function.name[3:]}")
+                named.add(f"{_CONSTANTS}{function.name[3:]}")
         for number, variable in enumerate(module.global_variables):
             constants = lookup_environment(variable.name)
-            is_ours = constants is not None and not constants.consts and variable.name not in kept
+            is_ours = constants is not None and not constants.consts and variable.name not in named
             if is_ours or variable.linkage == llvmlite.binding.Linkage.internal:
                 variable.linkage, variable.name = "private", f"constant.{number}"
         passes, builder = self._codegen._module_pass_manager()
