@@ -44,8 +44,8 @@ from engine.solids.pose import Pose
 from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import FloatArray, IntArray, read_only
 
-_HIGH: Final = np.arange(8)[:, None] >> np.arange(3) & 1, np.arange(3)
-"""Corner k of a box is at the high end of axis a if bit a of k is set."""
+_ENDS: Final = 3 * (np.arange(8)[:, None] >> np.arange(3) & 1) + np.arange(3)
+"""Of the six ends of a box those that each corner has: corner k is at the high end of axis a if bit a of k is set."""
 _LARGEST: Final = 1 << 16
 """Faces times corners of a pair up to which tables are made of it."""
 _FEW: Final = 64
@@ -79,7 +79,7 @@ def of_bodies(
     """Return the common volumes, or ratios, of those pairs of solids that are convex bodies of space, proven to be the
     nearest doubles, NaN of others. poses: of all first, and of all second ones, or lists of one a pair."""
     values = np.full(len(pairs), np.nan)
-    unique = {id(solid): solid for pair in pairs for solid in pair if solid.dimension == 3}
+    unique = {id(solid): solid for pair in pairs for solid in pair if getattr(solid, "dimension", 0) == 3}
     boxes = [(key, solid) for key, solid in unique.items() if isinstance(solid, Aabb)]
     forms, keys = [_BOX] if boxes else [], [key for key, _ in boxes]
     for number, (key, solid) in enumerate(unique.items()):
@@ -96,10 +96,6 @@ def of_bodies(
     if not rows:
         return values
     bodies, at = [(8 * k, 0, 8, 6, 0) for k in range(len(boxes))], [8 * len(boxes), 7, 24] if boxes else [0, 0, 0]
-    corners_of_boxes = np.zeros((at[0], 6))
-    if boxes:  # which have one table of faces
-        ends = np.array([(box.min, box.max) for _, box in boxes])
-        corners_of_boxes[:, :3] = ends[:, *_HIGH].reshape(-1, 3)
     for body in forms[1:] if boxes else forms:
         bodies.append((at[0], at[1], len(body.points), len(body.rings) - 1, at[2]))
         at = [at[0] + len(body.points), at[1] + len(body.rings), at[2] + len(body.corners)]
@@ -112,9 +108,14 @@ def of_bodies(
         chosen = rows if isinstance(pose, list) else rows[:1]
         which.append([len(moves) + (row if len(chosen) > 1 else 0) for row in range(len(rows))])
         moves += [_numbers_of(pose, pairs[row][k], k, row) for row in chosen]
-    joined = [np.concatenate(arrays) for arrays in zip(*forms)]
-    points = np.concatenate([corners_of_boxes, joined[0][len(_BOX.points) * (len(boxes) > 0) :]])
-    tables = [read_only(each) for each in (points, *joined[1:], np.array(bodies))]
+    points = np.zeros((at[0], 6))
+    if boxes:  # which have one table of faces
+        ends = np.array([(box.min, box.max) for _, box in boxes]).reshape(-1, 6)
+        points[: 8 * len(boxes), :3] = np.take(ends, _ENDS, axis=1).reshape(-1, 3)
+    if len(boxes) < len(keys):
+        np.concatenate([body.points for body in forms[len(boxes) > 0 :]], out=points[8 * len(boxes) :])
+    faces = (arrays[0] if len(forms) == 1 else np.concatenate(arrays) for arrays in [*zip(*forms)][1:])
+    tables = [read_only(each) for each in (points, *faces, np.array(bodies))]
     some, turns, made = np.array(which).T.copy(), np.array(moves), np.full(len(rows), np.nan)
     shapes = ((2, most, PLACED), (2, most_faces, PLANE), (2, most, most_faces), (2, most + most_faces + 8, CORNER),
               (2 * (most + most_sides), SPOT), (2, most_faces, 3))  # fmt: skip
