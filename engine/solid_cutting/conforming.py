@@ -14,11 +14,11 @@ Source: M. Granados et al., Boolean operations on 3D selective Nef complexes, 20
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import pairwise
 from math import lcm
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -115,14 +115,19 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     budget.check()
     places = {reduced(points.exact(number)): number for number in polled(np.unique(faces[involved]).tolist())}
     cells: list[tuple[int, Sides]] = []
-    n_given = len(points)
+    n_given, n_known = len(points), len(places)
+
+    def number_at(place: tuple[int, ...]) -> int:
+        return places.setdefault(place, n_given - n_known + len(places))
+
     for group, edges in _planes_of(faces, contacts):
         budget.check()
         is_left[group] = False
         if not edges and len(np.unique(np.sort(faces[group], axis=1), axis=0)) == 1:  # one triangle again and again
             is_left[group[0]] = len(group) % 2 == 1
         else:
-            cells += _cells(points, faces, group, edges, places, budget)
+            cells += _cells(points, faces, group, edges, number_at, budget)
+    points.add_places([*places][n_known:], budget)
     sides: IntArray = np.concatenate([faces[involved & is_left][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2),
                             np.array([side for _, own in cells for side in own], np.int64).reshape(-1, 2)])  # fmt: skip
     spots = np.concatenate([np.unique(faces[involved]), np.arange(n_given, len(points))])
@@ -163,12 +168,12 @@ def _view(points: Points, face: IntArray) -> tuple[Seen, Plane]:
 
 
 def _cells(
-    points: Points, faces: IntArray, group: list[int], edges: list[tuple[int, int]], places: dict[Any, int],
-    budget: Budget,
+    points: Points, faces: IntArray, group: list[int], edges: list[tuple[int, int]],
+    number_at: Callable[[tuple[int, ...]], int], budget: Budget,
 ) -> list[tuple[int, Sides]]:  # fmt: skip
     """Return the cells of a plane that an odd number of its triangles `group` cover: the first of these, and directed
     sides that have the cell on their left, seen as that triangle is counter-clockwise. edges: more in that plane;
-    places: numbers of points by place, updated."""
+    number_at: gives the number of the point at a place."""
     view, plane = _view(points, faces[group[0]])
     own = faces[group]
     segments = np.concatenate(
@@ -188,7 +193,7 @@ def _cells(
             way = [subdivision.arrangement.origin(each) for each in (half_edge, half_edge ^ 1)]
             for node in way:
                 if node not in known:
-                    known[node] = _number_of(points, nodes, node, view, plane, places)
+                    known[node] = number_at(_place_of(nodes, node, view, plane))
             sides[cell].append((known[way[0]], known[way[1]]))
     cells = []
     for cell, chain in sides.items():
@@ -198,8 +203,8 @@ def _cells(
     return cells
 
 
-def _number_of(points: Points, nodes: NodeTable, node: int, view: Seen, plane: Plane, places: dict[Any, int]) -> int:
-    """Return the number of the point at a node of an arrangement; it is added if it is new."""
+def _place_of(nodes: NodeTable, node: int, view: Seen, plane: Plane) -> tuple[int, ...]:
+    """Return the exact place of a node of an arrangement in a plane, reduced."""
     i, j = view.axes
     (x, y), (*normal, offset) = nodes.exact(node), plane.integers
     third = 3 - i - j
@@ -208,10 +213,7 @@ def _number_of(points: Points, nodes: NodeTable, node: int, view: Seen, plane: P
     place = [0, 0, 0, w]
     for axis, value in ((i, x), (j, y), (third, z)):
         place[axis] = int(value * w)
-    key = reduced(place)
-    if key not in places:
-        places[key] = points.add_place(key)  # type: ignore[arg-type]
-    return places[key]
+    return reduced(place)
 
 
 def _filled(points: Points, face: IntArray, sides: Sides, budget: Budget) -> IntArray:

@@ -181,15 +181,16 @@ class Points:
                 high[k, axis], low[k, axis] = nearest_pair(value, w)
         self.high, self.low = np.concatenate([self.high, high]), np.concatenate([self.low, low])
 
-    def add_place(self, place: Place) -> int:
-        """Add a point at an exact place; return its number."""
-        number = len(self)
-        pairs = np.array([nearest_pair(x, place[3]) for x in place[:3]])
-        self._places[number] = place
-        self._edges = np.concatenate([self._edges, [[-1, -1]]])
-        self._plane_of = np.concatenate([self._plane_of, [-1]])
-        self.high, self.low = (np.concatenate([each, row[None]]) for each, row in zip((self.high, self.low), pairs.T))
-        return number
+    def add_places(self, places: Sequence[tuple[int, ...]], budget: Budget) -> None:
+        """Add points at exact places."""
+        first, none = len(self), np.full((len(places), 2), -1)
+        pairs = np.empty((len(places), 3, 2))
+        for k, (x, y, z, w) in enumerate(places):
+            budget.check()
+            self._places[first + k] = x, y, z, w
+            pairs[k] = [nearest_pair(value, w) for value in (x, y, z)]
+        self._edges, self._plane_of = np.concatenate([self._edges, none]), np.append(self._plane_of, none[:, 0])
+        self.high, self.low = (np.concatenate(rows) for rows in zip((self.high, self.low), np.moveaxis(pairs, 2, 0)))
 
     def on_sides(self, sides: IntArray, spots: IntArray, budget: Budget) -> dict[tuple[int, int], list[int]]:
         """Return, by side (k, 2), which points of `spots` are in its interior, in their order from its first end on;
