@@ -21,6 +21,8 @@ from engine.types import BoolArray, FloatArray, IntArray
 
 _MOST_TRIES: Final = 256
 """Number of pairs of triangles that are measured in integers until one is as near."""
+_FEW: Final = 256
+"""Number of pairs that are sooner sorted one by one."""
 _TOLERANCE: Final = 2.0**-30
 """Enlargement of boxes in the wall, as part of the coordinates: far above their rounding."""
 
@@ -37,6 +39,9 @@ def ranks(mesh: MeshBody, triangles: IntArray) -> IntArray:
 def in_order(meshes: tuple[MeshBody, MeshBody], pairs: IntArray) -> IntArray:
     """Return rows (n, 4) that begin with a triangle of each body in the order of ties: by faces, then by corners."""
     a, b = meshes
+    faces = list(zip(a.faces[pairs[:, 0]].tolist(), b.faces[pairs[:, 1]].tolist()))
+    if len(pairs) <= _FEW and len(set(faces)) == len(faces):
+        return pairs[sorted(range(len(faces)), key=faces.__getitem__)]
     keys = ranks(b, pairs[:, 1]), ranks(a, pairs[:, 0]), b.faces[pairs[:, 1]], a.faces[pairs[:, 0]]
     return np.asarray(pairs[np.lexsort(keys)], np.int64)
 

@@ -16,7 +16,6 @@ Conversely a convex solid whose triangles all have an area passes, provided o li
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
@@ -65,8 +64,8 @@ def _certified(solid: Polyhedron) -> Convexity | None:
 
 def _center_and_side(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, int]:
     """Return the mean corner of all triangles, and their common side of it, 0 if there is none."""
-    center = vertices[triangles.ravel()].sum(axis=0) / triangles.size
-    return center, entry_of(_common_side)(vertices, triangles, center) if isfinite(sum(center.tolist())) else 0
+    center = np.empty(3)
+    return center, entry_of(_common_side)(vertices, triangles, center)
 
 
 def star_side(solid: Polyhedron) -> int:
@@ -80,8 +79,18 @@ def star_side(solid: Polyhedron) -> int:
 
 @kernel
 def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
-    """Return 1 or -1 if orient3d(a, b, c, center) has that sign for all triangles, else 0."""
+    """Fill center (3,) with the mean corner of all triangles; return 1 or -1 if orient3d(a, b, c, center) has that sign
+    for all of them, else 0."""
+    center[:] = 0.0
+    for item in range(triangles.shape[0]):
+        for corner in range(3):
+            for axis in range(3):
+                center[axis] += vertices[triangles[item, corner], axis]
+    for axis in range(3):
+        center[axis] /= 3 * triangles.shape[0]
     o, side = Point3(center[0], center[1], center[2]), 0
+    if not np.isfinite(o.x + o.y + o.z):
+        return 0
     for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)
         sign = orient3d(a, b, c, o)
