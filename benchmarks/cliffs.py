@@ -260,6 +260,8 @@ FAMILIES = [
     Family("union_all: equal squares", 250, partial(_union, lambda n: [UNIT] * n)),
     Family("union_all: nested circles", 100,
            partial(_union, lambda n: [awkward.unit_circle(32) * k for k in range(1, n)])),
+    Family("union_all: circles about one place", 64, partial(
+        _union, lambda n: list(awkward.unit_circle(32) + _draw(n).normal(0.0, 0.1, (n, 1, 2))))),
     Family("union_all: scattered circles", 250, partial(
         _union, lambda n: list(awkward.unit_circle(32) * 0.5 + _draw(n).uniform(0, n**0.5, (n, 1, 2))))),
     Family("clip_polygons: star on n lines", 8, lambda n: _clipped(
@@ -284,6 +286,8 @@ def grown(family: Family, n_sizes: int, most: float) -> tuple[str, list[str]]:
     line, faults, before = f"{family.name:44}", [], (0, 0.0)
     for n in (family.first * 4**k for k in range(n_sizes)):
         ask, peer = family.make(n)
+        if not before[0]:
+            ask()  # compiles
         ours = least(ask, most)
         line += f" | {n:>6} {1e3 * ours:9.3f} ms"
         exponent = log(ours / before[1]) / log(n / before[0]) if before[0] and before[1] > 0 < ours else 0.0
