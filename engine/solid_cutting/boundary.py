@@ -44,6 +44,7 @@ class Boundary(NamedTuple):
     | triangles | (m, 3) | of points, counter-clockwise seen from outside |
     | of | (m,) | the triangle of the solid that each is a part of |
     | wholes | (m, 3) | the corners of that triangle, in the same direction |
+    | are_whole | (m,) | whether it is all of that triangle |
     | touches | | whether triangles as given have points in common besides their corners and edges |
     """
 
@@ -51,12 +52,8 @@ class Boundary(NamedTuple):
     triangles: IntArray
     of: IntArray
     wholes: IntArray
+    are_whole: BoolArray
     touches: bool
-
-    @property
-    def are_whole(self) -> BoolArray:
-        """Whether each triangle is all of one of the solid (m,)."""
-        return np.asarray((self.triangles == self.wholes).all(axis=1))
 
 
 def boundary(solid: Polyhedron, budget: Budget) -> Boundary:
@@ -100,7 +97,7 @@ def _boundary_of(solid: Polyhedron, budget: Budget) -> Boundary:
     side = -star_side(solid) if certificate is None else 1 if certificate.is_outward else -1
     if side:
         triangles = triangles if side > 0 else read_only(triangles[:, ::-1])
-        return Boundary(points, triangles, of, triangles, False)
+        return Boundary(points, triangles, of, triangles, read_only(np.ones(len(of), np.bool_)), False)
     budget.check()
     contacts = _contacts(solid, budget)
     if contacts.crossing is not None:
@@ -119,7 +116,8 @@ def _boundary_of(solid: Polyhedron, budget: Budget) -> Boundary:
     if len(triangles):
         turns = _looks(solid, points, triangles, edges, is_flat, wholes, budget)[:, None]
         triangles, wholes = (np.where(turns, rows[:, ::-1], rows) for rows in (triangles, wholes))
-    return Boundary(points, read_only(triangles), read_only(of), read_only(wholes), contacts.touches)
+    are_whole = read_only((triangles == wholes).all(axis=1))
+    return Boundary(points, read_only(triangles), read_only(of), read_only(wholes), are_whole, contacts.touches)
 
 
 def _crossing(solid: Polyhedron, *pair: int) -> InvalidInputError:

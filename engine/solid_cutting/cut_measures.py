@@ -31,6 +31,7 @@ from engine.solid_cutting.exact_measures import (
     ExactMesh,
     area_in_roots,
     exact_centroid,
+    exact_faces,
     exact_mesh,
     exact_volume,
     nearest_root_over,
@@ -83,6 +84,8 @@ def narrowed(ends_of: Callable[[int], Any], rounded: Callable[[Any], float] = ne
 
 def _parted(points: Points, triangles: IntArray) -> tuple[IntArray, IntArray]:
     """Return the triangles whose corners are all vertices of the solid, which kernels can sum up, and the others."""
+    if points.is_in_range and len(points) == points.n_given:
+        return read_only(triangles), triangles[:0]
     is_new = (triangles >= points.n_given).any(axis=1) if points.is_in_range else np.ones(len(triangles), np.bool_)
     return read_only(triangles[~is_new]), triangles[is_new]
 
@@ -152,6 +155,8 @@ def nearest_centroid(points: Points, triangles: IntArray, budget: Budget) -> tup
 
 
 def _as_fractions(points: Points, triangles: IntArray) -> ExactMesh:
+    if len(points) == points.n_given:
+        return exact_faces(points.vertices, triangles)
     used, local = np.unique(triangles, return_inverse=True)
     places = [points.exact(number) for number in used.tolist()]
     return exact_mesh([[Fraction(x, p[3]) for x in p[:3]] for p in places], map(tuple, local.reshape(-1, 3).tolist()))
