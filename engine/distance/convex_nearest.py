@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from engine.collision.convex_body import REACH, convex_body_of, point_of, pool_of_one
+from engine.collision.convex_body import REACH, ConvexArrays, convex_body_of, point_of, pool_of_one
 from engine.collision.convex_pair import PlacedBody, placed_body
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.near_triangles import FACE
@@ -48,9 +48,6 @@ from engine.types import FlagArray, FloatArray, IntArray, Point3
 MOST_TRIANGLES: Final = 2048
 """Most triangles of a body that is searched so: a walk looks at all vertices, a tree leads to few."""
 
-HullArrays = namedtuple("HullArrays", "pool triangles")
-"""What the kernel reads of one body: its pool of one (`ConvexArrays`), and triangles (m, 3) of vertices of it."""
-
 _Named = namedtuple("_Named", "vertices triangles faces")
 """What `feature_of` reads."""
 
@@ -59,10 +56,10 @@ _Vertices = namedtuple("_Vertices", "vertices")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hull:
-    """A convex body; features: by triangle and code, as far as they were asked for."""
+    """A convex body, alone in its pool; features: by triangle and code, as far as they were asked for."""
 
     solid: Solid
-    arrays: HullArrays
+    pool: ConvexArrays
     named: _Named
     features: dict[int, Feature]
 
@@ -85,7 +82,7 @@ def hull_of(solid: Solid) -> Hull | None:
             return None
         faces = solid.triangle_faces if isinstance(solid, Polyhedron) else np.arange(len(body.triangles)) // 2
         named = _Named(body.points.T, body.triangles, faces)
-        return Hull(solid, HullArrays(pool_of_one(body), body.triangles), named, {})
+        return Hull(solid, pool_of_one(body), named, {})
 
     return solid.prepared("hull", build)
 
@@ -98,7 +95,7 @@ def nearest_of_hulls(first: Solid, second: Solid, poses: Poses) -> Clearance | N
         return None
     own, their = (STILL if at is None else PoseArrays(at.rotation[None], at.translation[None], True) for at in poses)
     points, row = np.empty((2, 3)), np.empty(4, np.int64)
-    distance = entry_of(nearest_of_convex)(a.arrays, own, b.arrays, their, points, row)
+    distance = entry_of(nearest_of_convex)(a.pool, own, b.pool, their, points, row)
     if not distance > 0.0:
         return None
     points.setflags(write=False)
@@ -114,23 +111,23 @@ def fill_gaps_of_hulls(
     a, b = hull_of(first), hull_of(second)
     if a is not None and b is not None:
         gap = np.inf if least is None else float(least)
-        entry_of(gaps_of_hulls)(a.arrays, STILL, b.arrays, poses, gap, least is None, answers, budget.flag)
+        entry_of(gaps_of_hulls)(a.pool, STILL, b.pool, poses, gap, least is None, answers, budget.flag)
         budget.check()
 
 
 @kernel
 def gaps_of_hulls(
-    first: HullArrays, own: PoseArrays, second: HullArrays, poses: PoseArrays, gap: float, is_measured: bool,
+    first: ConvexArrays, own: PoseArrays, second: ConvexArrays, poses: PoseArrays, gap: float, is_measured: bool,
     distances: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill distances (n,) of two convex bodies, the second under n poses, as `gap_of_convex` does. Returns early when
     the flag is set."""
-    a, reach = placed_body(first.pool, 0, own, 0), first.pool.numbers[0, REACH] + second.pool.numbers[0, REACH]
+    a, reach = placed_body(first, 0, own, 0), first.numbers[0, REACH] + second.numbers[0, REACH]
     for item in range(distances.shape[0]):
         if flag[0] != 0:
             return
-        b = placed_body(second.pool, 0, poses, item)
-        start = difference_of_centers(first.pool, 0, a, second.pool, 0, b)
+        b = placed_body(second, 0, poses, item)
+        start = difference_of_centers(first, 0, a, second, 0, b)
         distances[item] = gap_of_convex(a, b, start, reach, gap, is_measured)
 
 
@@ -191,17 +188,17 @@ def _measure_on_faces(
 
 @kernel
 def nearest_of_convex(
-    first: HullArrays, first_pose: PoseArrays, second: HullArrays, second_pose: PoseArrays, points: FloatArray,
+    first: ConvexArrays, first_pose: PoseArrays, second: ConvexArrays, second_pose: PoseArrays, points: FloatArray,
     row: IntArray,
 ) -> float:  # fmt: skip
     """Return the distance of two convex bodies, the nearest double, and fill points (2, 3) with the nearest points and
     row (4,) with a triangle and the code of the feature in it of each body; NaN where any of it is unproven. Of several
     triangles the first is named."""
-    a, b = placed_body(first.pool, 0, first_pose, 0), placed_body(second.pool, 0, second_pose, 0)
-    how, simplex = walk(a, b, difference_of_centers(first.pool, 0, a, second.pool, 0, b), np.inf, True)
+    a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
+    how, simplex = walk(a, b, difference_of_centers(first, 0, a, second, 0, b), np.inf, True)
     if how != FOUND:
         return np.nan
-    unit = unit_of(a, b, first.pool.numbers[0, REACH] + second.pool.numbers[0, REACH])
+    unit = unit_of(a, b, first.numbers[0, REACH] + second.numbers[0, REACH])
     i, j = spans_of(simplex)
     m = measure(a, b, i, j, unit)
     row[0], row[1] = _find(first.triangles, i)
