@@ -354,7 +354,7 @@ STEPS = (
 """Parts of the work, long ones first; a kernel that several need is compiled by the first, or in several processes."""
 SHARES = (18, 15, 14, 13, 8, 10, 8, 3, 3, 2, 2, 3, 1)
 """Duration of each of `STEPS`, in per cent."""
-GROUPS = ((1, 4, 6, 2, 7, 8, 9, 10, 12), (0, 3, 5, 11))
+GROUPS = ((1, 4, 6, 2, 7, 8), (0, 3, 5, 11, 9, 10, 12))
 """Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
 decides symbols and inlining. What both compile is that of the first."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)
