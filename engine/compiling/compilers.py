@@ -314,6 +314,10 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         return [steps]
 
 
+class DirectCompiler(KernelCompiler):
+    """Compiles an inner function for calls from Python, which is not cached: it may return named tuples."""
+
+
 class InnerCompiler(KernelCompiler):
     lowering = _InnerLowering
 

@@ -42,9 +42,9 @@ KERNELS: list[Any] = []
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 
 
-def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+def _compiled(function: Callable[..., Any], compiler: str = "KernelCompiler", **options: Any) -> Any:
     """Return the callable of a decorated function."""
-    more = {} if _compilers is None else {"pipeline_class": _compilers.KernelCompiler}
+    more = {} if _compilers is None else {"pipeline_class": getattr(_compilers, compiler)}
     return numba.njit(**more, **options)(function)
 
 
@@ -124,7 +124,7 @@ class _Inline:
 
     @functools.cached_property
     def _from_python(self) -> Any:
-        return _compiled(self.py_func, **_OPTIONS)
+        return _compiled(self.py_func, "DirectCompiler", **_OPTIONS)
 
     def __call__(self, *arguments: Any) -> Any:
         return self._from_python(*arguments)
