@@ -128,7 +128,7 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
         else:
             cells += _cells(points, faces, group, edges, number_at, budget)
     points.add_places([*places][n_known:], budget)
-    sides: IntArray = np.concatenate([faces[involved & is_left][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2),
+    sides: IntArray = np.concatenate([faces[involved][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2),
                             np.array([side for _, own in cells for side in own], np.int64).reshape(-1, 2)])  # fmt: skip
     spots = np.concatenate([np.unique(faces[involved]), np.arange(n_given, len(points))])
     on = points.on_sides(np.unique(np.sort(sides, axis=1), axis=0), spots, budget)

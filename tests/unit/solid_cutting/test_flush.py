@@ -194,3 +194,15 @@ def test_a_shell_may_touch_itself_along_a_line_within_its_faces() -> None:
         assert engine.area(body) == nearest(Fraction(16 * 2 + 16 + 2 + 8)) + 2 * 4 * np.sqrt(2.0)
         lower, upper = engine.cut(body, engine.HalfSpace([0, 0, -1], 1), keep="both")
         assert (lower.volume, upper.volume) == (16.0, 4.0)
+
+
+def test_faces_beside_one_that_an_edge_lies_across_are_cut_at_its_ends() -> None:
+    """On a cube a wedge, of which one edge lies on a face, from one side of that to another, and nothing else."""
+    wedge = np.array([(2, 0, 4), (4, 2, 4), (3, 1, 5), (2.5, 1.5, 6)])
+    rows = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    body = engine.Polyhedron(*joined([(block([0] * 3, [4] * 3), CUBE), (wedge, rows)]))
+    assert engine.volume(body) == nearest(64 + Fraction(1, 3))
+    parts: Any = engine.cut(body, engine.HalfSpace([0, 0, 1], -1), keep="both")
+    for part, volume in zip(parts, (48 + Fraction(1, 3), Fraction(16))):
+        assert part.volume == nearest(volume)
+        assert_closed(part.faces)
