@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal, Unpack, overload
@@ -132,8 +133,6 @@ def clearance(
         check_options(workers, progress, report=report)
     least = None if at_least is None else checked_distance(at_least)
     poses = first_pose, second_pose
-    if first_pose is not None and first_pose == second_pose:
-        poses = None, None  # as `collide_pair` does, so that the two agree
     if deadline is None and cancel is None and progress is None and not report:
         return _answer(first, second, poses, least, UNLIMITED)
     with Budget(deadline, cancel) as budget:
@@ -166,8 +165,22 @@ def do_meet(first: Solid, second: Solid, poses: Poses, budget: Budget) -> bool:
 
 
 def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
-    """Return the clearance of two bodies or, given `least`, whether it is at least that: by closed forms, half-space
-    planes, or a search."""
+    """Return the clearance of two bodies or, given `least`, whether it is at least that. Bodies moved together stay as
+    far apart as they are unmoved, as for `collide_pair`; the points are those of the moved ones (none where a rounded
+    rotation makes balls meet)."""
+    if poses[0] is None or poses[0] != poses[1]:
+        return _measured(first, second, poses, least, budget)
+    found = _measured(first, second, (None, None), least, budget)
+    if isinstance(found, bool) or found.points is None:
+        return found
+    moved = _measured(first, second, poses, None, budget)
+    assert isinstance(moved, Clearance)
+    return replace(found, points=moved.points, features=moved.features)
+
+
+def _measured(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
+    """Return what `_answer` says of bodies that are not moved together, or as if they were not: by closed forms,
+    half-space planes, or a search."""
     if least == 0.0:
         return True
     planes = has_plane(first, second)

@@ -163,6 +163,30 @@ def test_equal_poses_are_left_out_and_a_denormal_gap_is_kept() -> None:
         clearance(*wide)
 
 
+def test_points_of_bodies_moved_together_are_where_the_bodies_are() -> None:
+    tetrahedron = Polyhedron(
+        [[3, 0.5, 0.5], [4, 0, 0], [4, 1, 0], [4, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    )
+    box, ball = Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0.5], 1.0)
+    at = Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [10, 20, 30])
+    for first in (box, ball):
+        for second in (tetrahedron, Sphere([4, 0.5, 0.5], 1.0)):
+            alone, found = clearance(first, second), clearance(first, second, first_pose=at, second_pose=at)
+            assert isinstance(found, Clearance)
+            assert isinstance(alone, Clearance)
+            assert (found.distance, found.features) == (alone.distance, alone.features)
+            assert alone.points is not None
+            expected = alone.points @ at.rotation.T + at.translation
+            assert found.points is not None
+            assert np.abs(found.points - expected).max() < 1e-14 * 40
+    one, other = Polygon([[[0, 0], [1, 0], [0, 1]]]), Polygon([[[3, 0], [4, 0], [3, 1]]])
+    flat = Pose(np.eye(2), [10, 20])
+    found = clearance(one, other, first_pose=flat, second_pose=flat)
+    assert isinstance(found, Clearance)
+    assert found.points is not None
+    assert found.points.tolist() == [[11, 20], [13, 20]]
+
+
 def test_a_nearest_point_beyond_the_largest_double_is_an_error_with_what_to_do() -> None:
     far = Pose(np.eye(2), [1.5e308, 0.0])
     bodies = Aabb([1e308, 0.0], [1.1e308, 1.0]), Aabb([1e308, 3.0], [1.1e308, 4.0])
