@@ -57,8 +57,8 @@ def nearest_between_walls(bodies: tuple[ExactBody, ExactBody], pairs: IntArray, 
     if any(bool((side > 0).any()) for side in sides):
         return None
     budget.check()
-    n = np.array([float(x) for x in own[0]])
-    axes = np.linalg.svd(n[None] / np.abs(n).max())[2][1:]
+    most = max(map(abs, own[0]))  # beyond the largest double where coordinates are
+    axes = np.linalg.svd([[x / most for x in own[0]]])[2][1:]
     live = [_on_wall(body, (side == 0).astype(bool), axes) for body, side in zip(bodies, sides)]
     found = _lowest(bodies, gap, live, budget)
     return None if found is None else np.array([*found, *codes])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
-from engine import Polyhedron, Pose, Surface, clearance
+from engine import Polyhedron, Pose, Surface, clearance, clearance_poses
 from engine.distance import spreads
 from engine.distance.ties import nearest_between_walls
 from tests.unit.collision.meshes.bodies import TURN, brick
@@ -30,6 +32,28 @@ def test_little_room_changes_nothing(
     plenty = answered(first, second, pose, 4096, monkeypatch)
     for room in (16, 64):
         assert answered(first, second, pose, room, monkeypatch) == plenty
+
+
+@pytest.mark.parametrize("pose", [None, TURN])
+@pytest.mark.parametrize("size", [0.1, 1e-30, 1e100, 1e-200, 1e290])
+def test_walls_of_coordinates_with_all_their_bits(
+    size: float, pose: Pose | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The integers of such walls are beyond the largest double."""
+    pose = pose and Pose(pose.rotation, size * pose.translation)
+    turns = np.arange(200) * 2 * np.pi / 200
+    ring, faces = np.column_stack([np.cos(turns), np.sin(turns)]), [list(range(200))[::-1], list(range(200, 400))]
+    prism = np.concatenate([np.column_stack([ring, np.full(200, z)]) for z in (0.0, 1.0)])
+    faces += [[k, (k + 1) % 200, 200 + (k + 1) % 200] for k in range(200)]
+    faces += [[k, 200 + (k + 1) % 200, 200 + k] for k in range(200)]
+    first, second = Polyhedron(size * prism, faces), Polyhedron(size * (prism + np.array([0.1, 0.2, 3.0])), faces)
+    monkeypatch.setattr(spreads, "_ROOM", 64)
+    found = clearance(first, second, first_pose=pose, second_pose=pose)
+    assert found.distance == float(Fraction(second.vertices[0, 2]) - Fraction(first.vertices[200, 2]))
+    assert found.features is not None
+    assert [feature.kind for feature in found.features] == ["face", "face"]
+    moved = clearance_poses(first, second, *(np.eye(3)[None], np.zeros((1, 3))))
+    assert moved[0] == found.distance
 
 
 def test_walls_prove_plates_and_nothing_of_bodies_that_reach_around(monkeypatch: pytest.MonkeyPatch) -> None:
