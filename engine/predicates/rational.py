@@ -141,7 +141,7 @@ def nearest_float(value: Number) -> float:
         return top / bottom + 0.0  # Python rounds a quotient of integers correctly, subnormals included
     except OverflowError:
         raise NotRepresentableError(
-            f"an exact coordinate, {Decimal(top) / Decimal(bottom):.17g}, is beyond the largest float64, "
+            f"an exact value, {Decimal(top) / Decimal(bottom):.17g}, is beyond the largest float64, "
             "1.7976931348623157e+308; scale the input down"
         ) from None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 import os
 import threading
 import time
@@ -253,11 +254,18 @@ class Budget:
             raise CancelledError("the call was cancelled by its caller")
         if self._end is not None and (self.flag[0] or time.monotonic() >= self._end):
             raise DeadlineExceededError(
-                f"the deadline of {self.deadline!r} s passed before the call was done; "
+                f"the deadline of {self._first_to_end().deadline!r} s passed before the call was done; "
                 "ask for less in one call or give it more time"
             )
         if self.flag[0]:
             raise CancelledError("another part of the call failed")
+
+    def _first_to_end(self) -> Budget:
+        """Return the budget whose deadline was asked for: that of a call within a call is what was left of it."""
+        budget = self
+        while (around := budget.around) is not None and (around._end or math.inf) <= (budget._end or math.inf):
+            budget = around
+        return budget
 
     def left(self) -> float | None:
         """Return the seconds until the deadline, 0.0 after it, None without one."""

@@ -100,7 +100,7 @@ def _cut(plane: FloatArray, polygon: FloatArray, n: int, made: FloatArray, exten
                 dh, dl = dd_mul(dh, dl, h, low)
                 made[n_made, axis], made[n_made, axis + 3] = dd_add(polygon[k, axis], polygon[k, axis + 3], dh, dl)
             n_made += 1
-    return n_made, 0.0 if least > slack else 24.0 * slack * extent * extent / (most - least)
+    return n_made, 0.0 if least > slack else 24.0 * (slack / (most - least)) * extent * extent
 
 
 @called

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from engine.polygon_clipping.planes import plan_of
 from engine.predicates.rational import Number, determinant, nearest_float, scaled_integers
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
+from engine.solid_cutting.boundary import boundary
 from engine.solid_cutting.cut import cut_by_planes
 from engine.solid_cutting.cut_measures import narrowed, nearest_volume, volume_between, volume_in_fractions
 from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces, volume_of_boxes
@@ -27,7 +28,7 @@ from engine.solid_cutting.overlap_batches import (
     pose_of,
     ratio_of,
 )
-from engine.solid_cutting.plane_cut import plane_of
+from engine.solid_cutting.plane_cut import plane_of, plane_through
 from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid, named
 from engine.solids.convexity import convexity
@@ -39,6 +40,8 @@ from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import Accuracy, FloatArray
 
 Rows = list[list[Fraction]]
+_FEW: Final = 64
+"""Faces of a mesh up to which it is looked at whether it is convex after all."""
 
 
 def overlap_volume(
@@ -236,6 +239,11 @@ def _of_pair(
         if not is_ratio:
             return nearest_float(both), True
         return ratio_of([both, *(_own_volume(*pair, budget) for pair in zip((first, second), moves))]), True
+    if rows == [None, None] and isinstance(first, Polyhedron) and isinstance(second, Polyhedron):
+        if not all(len(boundary(each, budget).triangles) for each in (first, second)):
+            return 0.0, True
+        rows[1] = _rows_of_thin(second, moves[1], budget)
+        rows[0] = _rows_of_thin(first, moves[0], budget) if rows[1] is None else None
     if rows[0] is None and isinstance(first, Polyhedron) and rows[1] is not None:
         return _of_mesh(first, moves[0], rows[1], is_ratio, budget), False
     if rows[1] is None and isinstance(second, Polyhedron) and rows[0] is not None:
@@ -259,6 +267,18 @@ def _rows_of(solid: Solid, pose: Pose | None, budget: Budget) -> Rows | None:
         return None
     planes = (_as_plane(row) for row in plan_of(solid, budget.check).rows)
     return [[*normal, offset] for normal, offset in (image_plane(plane, pose) for plane in planes)]
+
+
+def _rows_of_thin(solid: Polyhedron, pose: Pose | None, budget: Budget) -> Rows | None:
+    """Return what `_rows_of` does of a convex polyhedron of few faces that is thinner than doubles lie, so that no
+    certificate is there."""
+    given = boundary(solid, budget)
+    if len(given.triangles) > _FEW:
+        return None
+    planes = [plane_through(solid.vertices[whole]).reversed for whole in given.wholes]
+    if any((given.points.sides(plane, budget) < 0).any() for plane in planes):
+        return None
+    return [[*normal, offset] for normal, offset in (image_plane(_as_plane(each.integers), pose) for each in planes)]
 
 
 def _as_plane(row: Sequence[Number]) -> tuple[tuple[Fraction, ...], Fraction]:

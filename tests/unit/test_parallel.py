@@ -50,6 +50,16 @@ def test_a_deadline_of_zero_does_no_work() -> None:
         run_chunks(lambda *_: pytest.fail("worked"), 10, budget=budget)
 
 
+def test_the_deadline_that_passed_is_named_as_it_was_given() -> None:
+    """Not what was left of it for a call within the call; one of its own that ends before is."""
+    with Budget(0.01) as budget:
+        time.sleep(0.02)
+        with Budget(budget.left()) as inner, pytest.raises(DeadlineExceededError, match=r"of 0\.01 s"):
+            inner.check()
+    with Budget(60.0), Budget(0.0) as first, pytest.raises(DeadlineExceededError, match=r"of 0\.0 s"):
+        first.check()
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_another_thread_can_cancel(workers: int) -> None:
     cancel = Cancel()

@@ -13,7 +13,15 @@ from engine.collision.collide import posed
 from engine.collision.exact_images import image_plane
 from engine.running.budget import Budget
 from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces
-from tests.reference.cutting import convex_overlap, cut_volume, nearest, points_of, ring_area, signed_volume
+from tests.reference.cutting import (
+    convex_overlap,
+    convex_overlap_of_space,
+    cut_volume,
+    nearest,
+    points_of,
+    ring_area,
+    signed_volume,
+)
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
 
 
@@ -263,3 +271,21 @@ def test_a_solid_that_was_in_a_scene_is_overlapped() -> None:
     assert engine.overlap_volume(cubes[0], cubes[1]) == 1.0
     engine.collide(cubes[0], cubes[1])
     assert engine.iou(cubes[0], cubes[1]) == 1.0
+
+
+def test_bounds_of_bodies_far_below_one_do_not_underflow() -> None:
+    """Tetrahedra of 1e-60, an ulp apart: their ratio is close to the middle of two doubles."""
+    v = [[8.845028912493791e-61, -5.499615686538552e-63, -1.6838143968410575e-60],
+         [8.436627082696915e-61, 4.162484797134742e-61, 8.734155452519467e-61],
+         [-3.366274663766816e-61, 8.281565184266096e-61, -1.0610649200016748e-60],
+         [5.6999981086545936e-61, -4.903803096280569e-61, 6.743517049201465e-61]]  # fmt: skip
+    ulps = [[-1, -1, -1], [1, 1, 1], [-1, 1, 1], [-1, -1, -1]]
+    vertices = np.array(v)
+    moved = np.nextafter(vertices, np.array(ulps, float))
+    rows = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    meshes = [(points_of(each), rows) for each in (vertices, moved)]
+    turns = [1 if signed_volume(*mesh) > 0 else -1 for mesh in meshes]
+    outward: Any = [(points, faces[:, ::turn]) for (points, faces), turn in zip(meshes, turns)]
+    expected = ratio(convex_overlap_of_space(*outward), *(signed_volume(*mesh) for mesh in outward))
+    first, second = (engine.Polyhedron(each, rows) for each in (vertices, moved))
+    assert engine.iou(first, second) == expected
