@@ -240,10 +240,10 @@ def _of_pair(
             return nearest_float(both), True
         return ratio_of([both, *(_own_volume(*pair, budget) for pair in zip((first, second), moves))]), True
     if rows == [None, None] and isinstance(first, Polyhedron) and isinstance(second, Polyhedron):
-        if not all(len(boundary(each, budget).triangles) for each in (first, second)):
-            return 0.0, True
         rows[1] = _rows_of_thin(second, moves[1], budget)
         rows[0] = _rows_of_thin(first, moves[0], budget) if rows[1] is None else None
+        if [] in rows:
+            return 0.0, True
     if rows[0] is None and isinstance(first, Polyhedron) and rows[1] is not None:
         return _of_mesh(first, moves[0], rows[1], is_ratio, budget), False
     if rows[1] is None and isinstance(second, Polyhedron) and rows[0] is not None:
@@ -271,10 +271,10 @@ def _rows_of(solid: Solid, pose: Pose | None, budget: Budget) -> Rows | None:
 
 def _rows_of_thin(solid: Polyhedron, pose: Pose | None, budget: Budget) -> Rows | None:
     """Return what `_rows_of` does of a convex polyhedron of few faces that is thinner than doubles lie, so that no
-    certificate is there."""
-    given = boundary(solid, budget)
-    if len(given.triangles) > _FEW:
+    certificate is there; none for one without interior."""
+    if len(solid.triangles) > _FEW:
         return None
+    given = boundary(solid, budget)
     planes = [plane_through(solid.vertices[whole]).reversed for whole in given.wholes]
     if any((given.points.sides(plane, budget) < 0).any() for plane in planes):
         return None

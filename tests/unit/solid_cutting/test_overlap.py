@@ -273,6 +273,12 @@ def test_a_solid_that_was_in_a_scene_is_overlapped() -> None:
     assert engine.iou(cubes[0], cubes[1]) == 1.0
 
 
+def _outward(places: list[np.ndarray], faces: np.ndarray) -> Any:
+    """Return meshes for the reference, each with its faces outwards."""
+    points = [points_of(vertices) for vertices in places]
+    return [(each, faces if signed_volume(each, faces) > 0 else faces[:, ::-1]) for each in points]
+
+
 def test_bounds_of_bodies_far_below_one_do_not_underflow() -> None:
     """Tetrahedra of 1e-60, an ulp apart: their ratio is close to the middle of two doubles."""
     v = [[8.845028912493791e-61, -5.499615686538552e-63, -1.6838143968410575e-60],
@@ -283,9 +289,29 @@ def test_bounds_of_bodies_far_below_one_do_not_underflow() -> None:
     vertices = np.array(v)
     moved = np.nextafter(vertices, np.array(ulps, float))
     rows = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
-    meshes = [(points_of(each), rows) for each in (vertices, moved)]
-    turns = [1 if signed_volume(*mesh) > 0 else -1 for mesh in meshes]
-    outward: Any = [(points, faces[:, ::turn]) for (points, faces), turn in zip(meshes, turns)]
-    expected = ratio(convex_overlap_of_space(*outward), *(signed_volume(*mesh) for mesh in outward))
+    meshes = _outward([vertices, moved], rows)
+    expected = ratio(convex_overlap_of_space(*meshes), *(signed_volume(*mesh) for mesh in meshes))
     first, second = (engine.Polyhedron(each, rows) for each in (vertices, moved))
     assert engine.iou(first, second) == expected
+
+
+def test_polyhedra_thinner_than_doubles_lie_are_convex_all_the_same() -> None:
+    """A tetrahedron whose mean corner rounds out of it; a flat one; only what is not convex is refused."""
+    vertices = np.array([[0.19999999999999998, 0.26666666666666666, 0.3333333333333333],
+                         [-0.0666666666666667, 0.4666666666666666, 0.0],
+                         [0.19999999999999998, 0.26666666666666666, 0.6666666666666666],
+                         [-0.3333333333333333, 0.6666666666666666, 0.6666666666666666]])  # fmt: skip
+    rows = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    thin, flat = engine.Polyhedron(vertices, rows), engine.Polyhedron(vertices * [1.0, 1.0, 0.0], rows)
+    other = engine.Polyhedron(vertices * 2.0 - vertices[0], rows)
+    meshes = _outward([thin.vertices, other.vertices], rows)
+    both, own = convex_overlap_of_space(*meshes), [signed_volume(*mesh) for mesh in meshes]
+    assert engine.overlap_volume(thin, other) == nearest(both)
+    assert engine.iou(other, thin) == ratio(both, *own)
+    assert (engine.overlap_volume(thin, thin), engine.iou(thin, thin)) == (nearest(own[0]), 1.0)
+    hollow = engine.Polyhedron(*joined([(block([-2] * 3, [2] * 3), CUBE), (block([-1] * 3, [1] * 3), CUBE)]))
+    assert engine.overlap_volume(hollow, thin) == 0.0
+    for pair in ((flat, thin), (hollow, flat), (flat, flat)):
+        assert engine.overlap_volume(*pair) == engine.iou(*pair) == 0.0
+    with pytest.raises(engine.UnsupportedPairError, match="cut one of them into convex parts"):
+        engine.overlap_volume(hollow, hollow)
