@@ -329,7 +329,7 @@ def _touches_in_planes(s: dual.Search, at: int, row: IntArray, own: Live, their:
                 g, their_count = s.second.faces[j], _n_listed(s.second, j, their)
                 if their_count == 0 or _strongest_kind(count, their_count) != kind:
                     continue
-                if (best, face, their_face) < (kind, f, g):
+                if (best, face, their_face) <= (kind, f, g):
                     continue
                 how, n_tried = _kind_of_faces(s, i, j), n_tried + 1
                 if how == UNSETTLED or n_tried > _MOST_TRIED or s.flag[0] != 0:

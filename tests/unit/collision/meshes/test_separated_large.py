@@ -120,3 +120,17 @@ def test_plates_with_little_between_them(at: tuple[float, float]) -> None:
         bent = Polyhedron(vertices, plate.triangles)
         assert collide(plate, bent, second_pose=move).relation == expected
         assert collide(bent, plate, first_pose=move).relation == expected
+
+
+def test_faces_of_many_triangles_are_named_in_time() -> None:
+    """Two prisms with flush sides of 510 triangles each: of one face all triangles have its number."""
+    n, turns = 512, np.arange(512) * 2 * np.pi / 512
+    ring = np.column_stack([np.cos(turns), np.sin(turns)])
+    faces = [list(range(n))[::-1], list(range(n, 2 * n))]
+    faces += [[k, (k + 1) % n, n + (k + 1) % n] for k in range(n)] + [[k, n + (k + 1) % n, n + k] for k in range(n)]
+    prism = Polyhedron(np.concatenate([np.column_stack([ring, np.full(n, z)]) for z in (0.0, 1.0)]), faces)
+    collide(prism, prism, second_pose=Pose(np.eye(3), [0, 0.5, -1]))  # compiles
+    found = collide(prism, prism, second_pose=Pose(np.eye(3), [0, 1, -1]), deadline=1.0)  # it took three seconds
+    assert found.relation == Relation.TOUCHING
+    assert found.witness is not None
+    assert (found.witness.kind, found.witness.first_face, found.witness.second_face) == ("face_face", 0, 1)
