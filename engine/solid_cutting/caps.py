@@ -12,6 +12,7 @@ Source: K. Weiler, P. Atherton, Hidden surface removal using polygon area sortin
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from fractions import Fraction
@@ -272,9 +273,10 @@ def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntA
     """Return the triangles (n, 3) of a polygon, all exactly counter-clockwise. is_exact: made with fractions where
     floats fail. Raises: _TurnedError where floats do not suffice, TooComplexError where fractions do not either."""
     ring = _joined(view, area, is_exact, budget)
-    corners, places = np.array(ring, np.int64), view.doubles(ring)
+    exponent = math.frexp(view.points.size)[1]
+    corners, places = np.array(ring, np.int64), np.ldexp(view.doubles(ring), -exponent)  # no product underflows
     span = float(np.ptp(places, axis=0).max())
-    slack = 2.0**-49 * (view.points.size + span) * span  # positions are off by 2^-53 of the largest coordinate
+    slack = 2.0**-49 * (1.0 + span) * span  # positions are off by 2^-53 of the largest coordinate
     made: IntArray | None = _ears_of(np.ascontiguousarray(places.T), slack, budget)
     if made is not None and (turned := _turned_in(view, corners, made, budget)):
         made = _clipped_again(view, ring, made.tolist(), turned, budget)

@@ -206,3 +206,19 @@ def test_faces_beside_one_that_an_edge_lies_across_are_cut_at_its_ends() -> None
     for part, volume in zip(parts, (48 + Fraction(1, 3), Fraction(16))):
         assert part.volume == nearest(volume)
         assert_closed(part.faces)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**-664, 2.0**400])
+def test_sides_with_points_on_them_are_filled_without_flat_triangles_at_any_scale(scale: float) -> None:
+    """Boxes that share a part of a wall, whose corners lie on sides of the other's triangles."""
+    faces = np.array([(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3),
+                      (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)])  # fmt: skip
+    boxes = [(block([0] * 3, [2] * 3), faces), (block([-1, 2, -1], [0, 3, 1]), faces)]
+    vertices, rows = joined(boxes)
+    vertices, numbers = np.unique(vertices, axis=0, return_inverse=True)
+    body = engine.Polyhedron(vertices * scale, numbers.reshape(-1)[rows])
+    assert (engine.centroid(body) / scale).tolist() == [0.7, 1.3, 0.8]  # type: ignore[operator]
+    for height in (0.0, 1.0, 2.0):
+        parts: Any = engine.cut(body, engine.HalfSpace([-1, 1, 1], -height * scale), keep="both")
+        for part in parts:
+            assert_closed(part.faces)
