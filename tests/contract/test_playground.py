@@ -158,9 +158,16 @@ def figures(page: Any) -> dict[str, str]:
 
 
 def colours(page: Any, canvas: str) -> int:
-    """Return how many different colours the picture has."""
-    picture = np.asarray(Image.open(io.BytesIO(page.locator(canvas).screenshot())).convert("RGB"))
-    return len(np.unique(picture.reshape(-1, 3), axis=0))
+    """Return how many different colours the picture has, once it has more than one: a frame is drawn when the browser
+    has time, which may be after the answer."""
+    n = 1
+    for _ in range(50):
+        picture = np.asarray(Image.open(io.BytesIO(page.locator(canvas).screenshot())).convert("RGB"))
+        n = len(np.unique(picture.reshape(-1, 3), axis=0))
+        if n > 1:
+            break
+        page.wait_for_timeout(100)
+    return n
 
 
 def request_of(page: Any) -> dict[str, Any]:
