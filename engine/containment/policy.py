@@ -71,7 +71,8 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
     over = mean_faces_above(solid) if spent[0] > 0.0 or n_points > SAMPLE else 0.0  # it takes 30 us to find out
     by_points = n_points * (_PASS_A_POINT + _PASS_A_FACE_OVER * over)
     by_pass = _PASS_A_FACE * n_faces + _PASS_MIXED * (n_points * n_faces) ** 0.5 + by_points
-    if spent[0] > _SOON * tree or by_points > max(tree, _ALONE) or by_pass > tree + n_points * cost_in_tree(solid):
+    by_tree = tree + n_points * (IN_TREE + IN_TREE_A_FACE_OVER * over)
+    if spent[0] > _SOON * tree or by_points > max(tree, _ALONE) or by_pass > by_tree:
         return Choice.LISTS
     spent[0] += by_pass
     return Choice.PASS
