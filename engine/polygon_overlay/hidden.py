@@ -23,7 +23,7 @@ from engine.types import OPEN, BoolArray, FloatArray, IntArray, read_only
 _GROUP: Final = 24
 _GROWS: Final = 4
 """Polygons of the first groups; how much larger groups become that leave out few."""
-_DEEP: Final = 96.0
+_DEEP: Final = 160.0
 """Number of boxes that meet a box from which groups pay."""
 _SAMPLE: Final = 16
 _MOST_TESTED: Final = 4096

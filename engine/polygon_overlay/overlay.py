@@ -287,7 +287,7 @@ def union_all(
     share vanish where they are one line exactly; `grid` makes them so.
 
     Cost: n log n for n edges in all, plus about a microsecond per crossing: 1,000 circles of 64 vertices 11 ms, 14,400
-    parcels that share all their edges 10 ms; polygons that a hundred others meet are united by groups first: 1,000
+    parcels that share all their edges 10 ms; polygons that 160 others meet are united by groups first: 1,000
     circles of 32 vertices about one place 40 ms.
 
     References

@@ -179,7 +179,7 @@ def test_a_hidden_polygon_that_fills_a_hole_stays() -> None:
 
 def test_many_on_each_other() -> None:
     random = np.random.default_rng(5)
-    layer = [[circle_at(*random.normal(size=2) / 8)] for _ in range(150)]
+    layer = [[circle_at(*random.normal(size=2) / 8)] for _ in range(200)]
     polygons = [engine.Polygon(rings) for rings in layer]
     few = hidden.without_hidden(polygon_arrays_of(polygons), Budget())
     assert np.count_nonzero(np.diff(few.polygon_offsets)) < 30
