@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from engine.bounding.morton import morton_codes
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.implicit_rings import NO_RINGS, edges_along
 from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays
@@ -25,6 +26,8 @@ _GROWS: Final = 4
 """Polygons of the first groups; how much larger groups become that leave out few."""
 _DEEP: Final = 160.0
 """Number of boxes that meet a box from which groups pay."""
+_BITS: Final = 16
+"""Bits of each coordinate in the Morton code."""
 _SAMPLE: Final = 16
 _MOST_TESTED: Final = 4096
 """How many boxes are tested for that, against at most how many others."""
@@ -43,7 +46,7 @@ def without_hidden(polygons: PolygonArrays, budget: Budget) -> PolygonArrays:
     low, high = polygons.boxes(numbers)
     if _depth(low, high) < _DEEP:
         return polygons
-    numbers = numbers[_spatial_order(low, high)]
+    numbers = numbers[np.argsort(morton_codes(low, high, _BITS), kind="stable")]
     size = _GROUP
     while size < _PAYS * len(numbers):  # bound: each turn leaves out a quarter, or makes groups larger
         is_needed = _bounds_its_group(polygons.take(numbers), size, budget)
@@ -62,17 +65,6 @@ def _depth(low: FloatArray, high: FloatArray) -> float:
     some, others = np.arange(0, n, -(-n // _SAMPLE)), np.arange(0, n, -(-n // _MOST_TESTED))
     meets = (low[some, None] <= high[others]) & (high[some, None] >= low[others])
     return float(meets.all(axis=2).mean()) * n
-
-
-def _spatial_order(low: FloatArray, high: FloatArray) -> IntArray:
-    """Return an order of boxes in which neighbours are near: by the interleaved bits of their middles."""
-    middles = low / 4 + high / 4  # half of them: differences stay finite
-    size = np.maximum(middles.max(axis=0) - middles.min(axis=0), np.finfo(float).tiny)
-    cells = ((middles - middles.min(axis=0)) / size * 65_535.0).astype(np.int64)
-    keys = np.zeros(len(cells), np.int64)
-    for bit in range(16):
-        keys |= ((cells[:, 0] >> bit & 1) << 2 * bit) | ((cells[:, 1] >> bit & 1) << 2 * bit + 1)
-    return np.argsort(keys, kind="stable")
 
 
 def _bounds_its_group(polygons: PolygonArrays, size: int, budget: Budget) -> BoolArray:

@@ -4,7 +4,7 @@ A polygon gets a tree of boxes over its edges. Rings are sorted along a space-fi
 tree is implicit: node i has the children 2 i and 2 i + 1, the second half are leaves of `LEAF_SIZE` edges, and an empty
 box has low = +inf. Boxes are exact, so a test without rounding is exact; a test with rounding is conservative.
 
-Source: the order is that of G. M. Morton, A computer oriented geodetic data base, 1966.
+Source of the order: `morton.py`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.bounding.bvh import UNUSED, Bvh, build_stretched_bvh, cache_aligned
+from engine.bounding.morton import morton_codes
 from engine.containment.methods.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
 from engine.lanes.faces import CORNER_ROWS
@@ -119,25 +119,8 @@ def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
     if len(offsets) == 2:
         return np.arange(len(low))
     starts = offsets[:-1]
-    keys = _curve(np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts))
+    keys = morton_codes(np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts), _BITS)
     return np.argsort(np.repeat(keys, np.diff(offsets)), kind="stable")
-
-
-def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
-    """Return the Morton code of the centre of each box low .. high; any order is correct, a good one is fast."""
-    centers = low / 2 + high / 2
-    smallest = centers.min(axis=0)
-    extent = (centers / 2 - smallest / 2).max(axis=0)
-    extent[extent == 0.0] = 1.0
-    with np.errstate(all="ignore"):
-        cells = np.nan_to_num((centers / 2 - smallest / 2) / extent * (2**_BITS - 1), nan=0.0)
-    cells = np.clip(cells, 0, 2**_BITS - 1).astype(np.uint64)
-    key = np.zeros(len(low), np.uint64)
-    dimension = low.shape[1]
-    for bit in range(_BITS):
-        for k in range(dimension):
-            key |= ((cells[:, k] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(bit * dimension + k)
-    return key
 
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
