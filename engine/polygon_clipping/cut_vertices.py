@@ -6,8 +6,11 @@ An original vertex has remainder and bound zero, and so has a coordinate that is
       t                           1 u^2 of a for each of 2 products, 2 sums, + 2 (2 u)^2 (first quotient): < 20 u^2
       `point_on_edge`             + 4 roundings of low parts, each <= 3 u |t (y - x)| + u |x|
       total                       error <= 40 u^2 (|x| + |t (y - x)|)
-    between cut vertices          max of both ends' bounds + roundings of cut_point.py + r |y - x|
-      r                           relative error of the weights: t moves by at most 2 r t (1 - t) <= r / 2
+    between cut vertices          max of both ends' bounds + 64 u^2 (|x| + |t (y - x)|) + r |y - x|
+      t                           3 u^2 for the sum of weights, 22 u^2 for the quotient by an inverse
+      `interpolate`               low parts, of remainders up to 2 u |x|: 29 u^2 |x| + 27 u^2 |t (y - x)|, their product
+                                  left out 4 u^2 |x| + 3 u^2 |t (y - x)|, the test 2 u^2 of both
+      r                           the larger error of both plane values over their sum
 
 Range: coordinates below 2^64. Divisors are above `WIDEST`, so underflows (2^-1074) amount to less than 2^-870, which
 `TINY` covers.
@@ -22,14 +25,13 @@ import numpy as np
 
 from engine.compiling.jit import called, inline, merged
 from engine.polygon_clipping.rings import Plane
-from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND, point_along
+from engine.predicates.cut_point import point_along
 from engine.predicates.digits import SLOT, sign_of, store_double, sum_products
 from engine.predicates.error_free import (
     U2,
     dd_add,
-    dd_div,
-    dd_mul,
     even_of,
+    fast_two_sum,
     fma,
     is_correctly_rounded,
     two_diff,
@@ -43,8 +45,9 @@ DOUBT: Final = -1
 VALUE_BOUND: Final = 16.0 * 2.0**-53
 """Relative error bound of a plane value in doubles: a term loses the low parts of row and vertex, a product, three
 sums; its size as much again."""
-DD_VALUE_BOUND: Final = 32.0 * U2
-"""The same in double-double: rows known to 2 u^2, products 5 u^2, three sums of 4 u^2."""
+DD_VALUE_BOUND: Final = 48.0 * U2
+"""The same in double-double, times the sum S of |terms|: the low parts of a term lose 17 u^2 S in all, their sum, at
+most 8 u S, 24 u^2 S, what is left out 2 u^2 S, and rows are known to 2 u^2."""
 EDGE_BOUND: Final = 64.0 * U2
 TINY: Final = 2.0**-800
 WIDEST: Final = 2.0**-200
@@ -106,39 +109,44 @@ def distance_across(x: float, low: float, bound: float, at: float) -> tuple[floa
     return h, rest, bound + 4.0 * U2 * abs(h)
 
 
-class CutWeights(NamedTuple):
-    """Where an edge p q is cut. ph + pl, qh + ql: |value| of the plane at p and q; sum_h + sum_l: their sum; th + tl: t
-    = |p| / sum, all double-doubles; r: relative error of t."""
+class Parameter(NamedTuple):
+    """Where an edge is cut: t = th + tl, a double-double; moved: how far it may be off by errors of plane values."""
 
-    ph: float
-    pl: float
-    qh: float
-    ql: float
-    sum_h: float
-    sum_l: float
     th: float
     tl: float
-    r: float
+    moved: float
 
 
 @inline
-def interpolate(x: Triple, y: Triple, s: CutWeights) -> Triple:
-    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x) for the weights s; x, y and the result are (double,
-    remainder, error bound)."""
-    x_h, x_low, x_bound = x
-    y_h, y_low, y_bound = y
-    if x_low != 0.0 or y_low != 0.0 or x_bound != 0.0 or y_bound != 0.0:
-        ah, al = dd_mul(x_h, x_low, s.qh, s.ql)
-        bh, bl = dd_mul(y_h, y_low, s.ph, s.pl)
-        nh, nl = dd_add(ah, al, bh, bl)
-        h, rest = dd_div(nh, nl, s.sum_h, s.sum_l)
-        bound = 1.01 * (max(x_bound, y_bound) + CUT_BOUND * max(abs(x_h), abs(y_h)) + s.r * abs(y_h - x_h))
-        return h, rest, bound + TINY
-    if x_h == y_h:
-        return x_h, 0.0, 0.0
-    h, low, mh, dh = point_along(x_h, y_h, s.th, s.tl)
+def parameter_of(p: Triple, q: Triple) -> Parameter:
+    """Return t = |p| / (|p| + |q|) for the values of a plane at both ends, of different signs and larger than `WIDEST`,
+    each (double, remainder, error bound). By errors e and f of the values it moves by (e |q| - f |p|) / (|p| +
+    |q|)^2."""
+    (ph, pl, p_bound), (qh, ql, q_bound) = p, q
+    if ph < 0.0:
+        ph, pl = -ph, -pl
+    else:
+        qh, ql = -qh, -ql
+    sum_h, rest = two_sum(ph, qh)
+    sum_h, sum_l = fast_two_sum(sum_h, rest + (pl + ql))
+    inverse = 1.0 / sum_h
+    th = ph * inverse
+    tl = ((fma(-th, sum_h, ph) + pl) - th * sum_l) * inverse
+    return Parameter(th, tl, 1.01 * max(p_bound, q_bound) * inverse)
+
+
+@inline
+def interpolate(x: Triple, y: Triple, t: Parameter) -> Triple:
+    """Return x + t (y - x); x, y and the result are (double, remainder, error bound)."""
+    (x_h, x_low, x_bound), (y_h, y_low, y_bound) = x, y
+    if x_h == y_h and x_low == y_low and x_bound + y_bound == 0.0:
+        return x_h, x_low, 0.0
+    dh, dl = two_diff(y_h, x_h)
+    mh, ml = two_prod(t.th, dh)
+    h, low = two_sum(x_h, mh)
+    low = (low + ml) + (t.tl * dh + t.th * (dl + (y_low - x_low))) + x_low
     h, rest = two_sum(h, low)
-    return h, rest, 1.01 * (POINT_BOUND * (abs(x_h) + abs(mh)) + s.r * abs(dh)) + TINY
+    return h, rest, 1.01 * (max(x_bound, y_bound) + EDGE_BOUND * (abs(x_h) + abs(mh)) + t.moved * abs(dh)) + TINY
 
 
 Vertices = namedtuple("Vertices", "pool rests edges names heap terms")
@@ -206,10 +214,12 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
     h, low = plane.high[number, d], plane.low[number, d]
     size, moved = abs(h), 0.0
     for k in range(d):
-        x, rest, bound = coordinate(s, v, k, n_ring)
-        ph, pl = dd_mul(plane.high[number, k], plane.low[number, k], x, rest)
-        h, low = dd_add(h, low, ph, pl)
-        size, moved = size + abs(ph), moved + abs(plane.high[number, k]) * bound
+        a, (x, rest, bound) = plane.high[number, k], coordinate(s, v, k, n_ring)
+        term, term_low = two_prod(a, x)
+        h, sum_low = two_sum(h, term)
+        low += (sum_low + term_low) + (a * rest + plane.low[number, k] * x)
+        size, moved = size + abs(term), moved + abs(a) * bound
+    h, low = two_sum(h, low)
     return h, low, DD_VALUE_BOUND * size + 1.01 * moved + TINY
 
 
@@ -319,23 +329,15 @@ def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
 def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> bool:
     """Set vertex j to the crossing of edge p q, between original or cut vertices, with a plane; return whether all its
     doubles are proven nearest. Vertices below n_ring are original ones."""
-    d = len(s.names)
-    ph, pl, p_bound = value_of(s, plane, p, n_ring)
-    qh, ql, q_bound = value_of(s, plane, q, n_ring)
-    if ph < 0.0:
-        ph, pl = -ph, -pl
-    if qh < 0.0:
-        qh, ql = -qh, -ql
-    if not (p_bound < 0.001 * ph and q_bound < 0.001 * qh and min(ph, qh) > WIDEST):
+    d, at_p, at_q = len(s.names), value_of(s, plane, p, n_ring), value_of(s, plane, q, n_ring)
+    size_p, size_q = abs(at_p[0]), abs(at_q[0])
+    if not (at_p[2] < 0.001 * size_p and at_q[2] < 0.001 * size_q and min(size_p, size_q) > WIDEST):
         return False
-    r = 1.01 * max(p_bound / ph, q_bound / qh) if p_bound > 0.0 or q_bound > 0.0 else 0.0
-    sum_h, sum_l = dd_add(ph, pl, qh, ql)
-    th, tl = dd_div(ph, pl, sum_h, sum_l)
-    share, is_certified = CutWeights(ph, pl, qh, ql, sum_h, sum_l, th, tl, r), True
+    t, is_certified = parameter_of(at_p, at_q), True
     for k in range(d):
         h, rest, bound = plane.place, 0.0, 0.0
         if k != plane.axis:
-            h, rest, bound = interpolate(coordinate(s, p, k, n_ring), coordinate(s, q, k, n_ring), share)
+            h, rest, bound = interpolate(coordinate(s, p, k, n_ring), coordinate(s, q, k, n_ring), t)
         is_certified = is_certified & is_correctly_rounded(h, rest, bound)
         set_coordinate(s, j, k, h, rest, bound)
     return is_certified

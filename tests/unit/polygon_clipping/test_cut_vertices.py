@@ -11,16 +11,17 @@ import pytest
 
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.cut_vertices import (
-    CutWeights,
     edge_parameter,
     interpolate,
     is_exactly_at,
+    parameter_of,
     point_on_edge,
     settle,
+    value_of,
 )
 from engine.polygon_clipping.in_doubles import scratch_for
 from engine.polygon_clipping.in_integers import MOST_BITS, clip_polygon, integer_row, plane_through
-from engine.predicates.error_free import dd_add, dd_div
+from engine.polygon_clipping.rings import Plane
 from engine.solids.primitives import Aabb, Convex
 from tests.unit.polygon_clipping.test_clip_polygons import check
 
@@ -43,19 +44,46 @@ def test_cuts_are_within_their_bounds() -> None:
 
 
 def test_a_cut_between_cut_vertices_is_within_its_bound() -> None:
+    """Plane values of both ends, and the ends themselves, are off by as much as their bounds allow."""
     rng = np.random.default_rng(3)
-    for _ in range(300):
-        x, y = rng.uniform(-1, 1, 2).tolist()
-        ph, qh = rng.uniform(0.1, 1, 2).tolist()
-        (x_low, pl), (y_low, ql) = rng.uniform(-1, 1, (2, 2)) * 2.0**-56
-        sum_h, sum_l = dd_add(ph, pl, qh, ql)
-        th, tl = dd_div(ph, pl, sum_h, sum_l)
-        share = CutWeights(ph, pl, qh, ql, sum_h, sum_l, th, tl, 0.0)
-        p, q = Fraction(ph) + Fraction(pl), Fraction(qh) + Fraction(ql)
+    for _ in range(400):
+        x, y = (rng.uniform(-1, 1, 2) * 10.0 ** rng.integers(-3, 3, 2)).tolist()
+        ph, qh = (rng.uniform(0.01, 1, 2) * 10.0 ** rng.integers(-3, 3, 2)).tolist()
+        (pl, ql), (x_low, y_low) = rng.uniform(-1, 1, (2, 2)) * 2.0**-54
+        pl, ql, x_low, y_low = pl * ph, ql * qh, x_low * abs(x), y_low * abs(y)
+        p_bound, q_bound, x_bound, y_bound = (rng.choice([0.0, 2.0**-100, 2.0**-30], 4) * [ph, qh, 1, 1]).tolist()
+        turn = 1.0 if rng.random() < 0.5 else -1.0
+        t = parameter_of((turn * ph, turn * pl, p_bound), (-turn * qh, -turn * ql, q_bound))
         for low in (0.0, 1.0):
-            first, second = Fraction(x) + Fraction(low * x_low), Fraction(y) + Fraction(low * y_low)
-            h, rest, bound = interpolate((x, low * x_low, 0.0), (y, low * y_low, 0.0), share)
-            assert abs(Fraction(h) + Fraction(rest) - (first * q + second * p) / (p + q)) <= Fraction(bound)
+            h, rest, bound = interpolate((x, low * x_low, x_bound), (y, low * y_low, y_bound), t)
+            for sides in itertools.product((-1, 0, 1), repeat=4):
+                off = [side * Fraction(each) for side, each in zip(sides, (p_bound, q_bound, x_bound, y_bound))]
+                p, q = Fraction(ph) + Fraction(pl) + off[0], Fraction(qh) + Fraction(ql) + off[1]
+                first = Fraction(x) + Fraction(low * x_low) + off[2]
+                second = Fraction(y) + Fraction(low * y_low) + off[3]
+                assert abs(Fraction(h) + Fraction(rest) - (first * q + second * p) / (p + q)) <= Fraction(bound)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_plane_value_is_within_its_bound(dimension: int) -> None:
+    """Also where nearly all of it cancels, at cut vertices and for rows of double-doubles."""
+    rng = np.random.default_rng(dimension)
+    made = scratch_for(2, 1, tuple(range(dimension))).vertices
+    for _ in range(300):
+        high = np.append(rng.uniform(-1, 1, dimension), 0.0)
+        point = rng.uniform(-1, 1, dimension) * 10.0 ** rng.integers(-3, 3, dimension)
+        high[-1] = -(high[:-1] @ point) * (1.0 + rng.choice([0.0, 1.0, 2.0**-40]))
+        low, rests = (rng.choice([0.0, 2.0**-54]) * rng.uniform(-1, 1, n) for n in (dimension + 1, dimension))
+        low, rests = low * high, rests * point
+        bound = rng.choice([0.0, 2.0**-80])
+        made.pool[dimension:] = point
+        made.rests[2 * dimension :] = np.stack([rests, np.full(dimension, bound)], axis=1).ravel()
+        h, rest, error = value_of(made, Plane(high[None], low[None], 0, -1, 0.0), 1, 1)
+        row = [Fraction(a) + Fraction(b) for a, b in zip(high.tolist(), low.tolist())]
+        for sides in itertools.product((-1, 1), repeat=dimension):
+            place = [Fraction(x) + Fraction(y) + side * Fraction(bound) for x, y, side in zip(point, rests, sides)]
+            exact = row[-1] + sum(a * x for a, x in zip(row, place))
+            assert abs(Fraction(h) + Fraction(rest) - exact) <= Fraction(error)
 
 
 def test_a_cut_at_a_double_is_known_to_be_there() -> None:
