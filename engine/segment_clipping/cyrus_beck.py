@@ -245,11 +245,13 @@ def decide_on_rows(
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
         workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
+    lanes = workspace(64)
     n_accepted, n_open, beyond = 0, 0, 0
     for begin in range(first, last, BLOCK):
         size = min(BLOCK, last - begin)
         n_lanes = (size + 7) >> 3 << 3  # whole vectors, filled by the last one: what lies there may take long to divide
         for i in range(n_lanes):
+            lanes[i] = i
             px[i], py[i], pz[i] = point_of(segments, min(begin + i, last - 1), 0, is_flat)
             qx[i], qy[i], qz[i] = point_of(segments, min(begin + i, last - 1), 1, is_flat)
         for i in range(n_lanes):
@@ -261,6 +263,25 @@ def decide_on_rows(
         for j in range(m):
             if stop[0]:
                 return
+            if j & 3 == 0 and j > 0:
+                n_out = 0
+                for i in range(size):
+                    n_out += is_out[i] != 0.0
+                if 2 * n_out >= size:  # the others are moved together, in order
+                    n_left = 0
+                    for i in range(size):
+                        to = n_left
+                        px[to], py[to], pz[to], qx[to], qy[to], qz[to] = px[i], py[i], pz[i], qx[i], qy[i], qz[i]
+                        t0[to], slack0[to], plane0[to], rival0[to] = t0[i], slack0[i], plane0[i], rival0[i]
+                        t1[to], slack1[to], plane1[to], rival1[to] = t1[i], slack1[i], plane1[i], rival1[i]
+                        most[to], is_open[to], lanes[to] = most[i], is_open[i], lanes[i]
+                        n_left += is_out[i] == 0.0
+                    size = n_left
+                    n_lanes = (size + 7) >> 3 << 3
+                    for i in range(n_lanes):
+                        is_out[i] = 0.0
+                    if size == 0:
+                        break
             aj, bj, cj, dj, slope, floor = a[j], b[j], c[j], d[j], columns[-2, j], columns[-1, j] + NARROWEST
             for i in range(n_lanes):
                 p = aj * px[i] + bj * py[i] + cj * pz[i] + dj
@@ -278,6 +299,7 @@ def decide_on_rows(
                     -t, slack, float(j), p_in & q_out, Latest(t1[i], slack1[i], plane1[i], rival1[i])
                 )
         for i in range(size):
+            item = begin + int(lanes[i])
             entered, left = (
                 Latest(t0[i], slack0[i], plane0[i], rival0[i]),
                 Latest(t1[i], slack1[i], plane1[i], rival1[i]),
@@ -285,11 +307,11 @@ def decide_on_rows(
             state = int(state_of(entered, left, is_out[i] != 0.0, is_open[i] != 0.0))
             plane_in, plane_out = int(entered.plane), int(left.plane)
             if state == OPEN:
-                state, plane_in, plane_out, more = decide_alone(segments, begin + i, columns, limit, numbers, chosen)
+                state, plane_in, plane_out, more = decide_alone(segments, item, columns, limit, numbers, chosen)
                 beyond += more
                 if state == OPEN:
-                    still[n_open] = begin + i
+                    still[n_open] = item
                     n_open += 1
-            items[n_accepted], planes[n_accepted, 0], planes[n_accepted, 1] = begin + i, plane_in, plane_out
+            items[n_accepted], planes[n_accepted, 0], planes[n_accepted, 1] = item, plane_in, plane_out
             n_accepted += state == ACCEPTED
     n[0], n[1], n[2] = n_accepted, n_open, beyond
