@@ -7,29 +7,28 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
-from math import isfinite, sqrt
 from typing import Any, ClassVar, Final, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.compiling.jit import entry_of
-from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
+from engine.errors import TooComplexError
+from engine.polygon_clipping.contours import FEW, USUAL, Contours, as_contours, equal_rings
 from engine.polygon_clipping.in_integers import clip_polygon
 from engine.polygon_clipping.planes import KernelScene, Plan, kernel_scene, plan_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
-from engine.predicates.rational import largest_of, scaled_back
-from engine.running.budget import UNLIMITED, Budget, Cancel, polled
+from engine.predicates.rational import scaled_back
+from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
-from engine.solids.geometries import geometry_of
+from engine.solids.checks import is_ready
 from engine.solids.pictures import Pictured
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import Ragged, rings_as_geojson, summed
-from engine.solids.shapes import as_solid, as_solids
+from engine.solids.shapes import as_solid
 from engine.types import OPEN, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 
@@ -102,11 +101,6 @@ class ClippedPolygons(Pictured, Ragged):
 
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
-_FEW: Final = 3072
-"""Number of coordinates that are clipped faster than a batch is planned."""
-_USUAL: Final = (2.0**-100, 2.0**120)
-"""Range of the sum of squares of few coordinates, from which the largest follows, in which nothing is scaled.
-`numpy.vdot` does not warn on overflow, as `dot` does."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any] | SolidsLike
 
 
@@ -196,7 +190,7 @@ def clip_polygons(
         if few is not None:
             return few
     contours = as_contours(polygons, region.dimension) if plan is not None and is_free else None
-    if plan is not None and contours is not None and len(contours.vertices) <= _FEW:
+    if plan is not None and contours is not None and len(contours.vertices) <= FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:
         with Budget(deadline, cancel) as budget:
@@ -214,32 +208,14 @@ def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> Clipp
         return None
     n, size, _ = polygons.shape
     flat = polygons.reshape(-1)
-    if not (0 < len(flat) <= _FEW and _USUAL[0] < np.vdot(flat, flat) < _USUAL[1]):
+    if not (0 < len(flat) <= FEW and USUAL[0] < np.vdot(flat, flat) < USUAL[1]):
         return None
     result = _clip_few(flat, plan.tables, *_few_rings(n, size), UNLIMITED)
     return None if result is None else result[0]
 
 
-def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
-    """Return ring offsets and polygon offsets, read-only, of n polygons of one ring of `size` vertices each."""
-    numbers = np.arange(n + 1)
-    return read_only(size * numbers), read_only(numbers)
-
-
-_few_rings = functools.lru_cache(64)(_equal_rings)
-"""`_equal_rings`, cached for arrays that are clipped at once."""
-
-
-class Contours(NamedTuple):
-    """The rings of all polygons of a call."""
-
-    dimension: int
-    vertices: FloatArray
-    """(m * dim,), flat; zeros of either sign."""
-    ring_offsets: IntArray
-    polygon_offsets: IntArray
-    size: float
-    """Largest magnitude of a coordinate; or another number, if both need no scaling."""
+_few_rings = functools.lru_cache(64)(equal_rings)
+"""`equal_rings`, cached for arrays that are clipped at once."""
 
 
 class Batch(NamedTuple):
@@ -252,62 +228,6 @@ class Batch(NamedTuple):
     state: FlagArray
     may_have_bridges: BoolArray
     status: Int8Array
-
-
-def as_contours(polygons: Any, dimension: int) -> Contours:
-    """Return the rings of all polygons of a call: an array (one ring a polygon), a list of polygons or of lists of
-    rings, or GeoJSON. An array is not copied.
-
-    No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring without vertices;
-    InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element.
-    """
-    if isinstance(polygons, np.ndarray):
-        array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
-        n, size = array.shape[:2]
-        if n and not size:
-            raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
-        flat = array.reshape(-1)
-        if not isfinite(largest := _size_of(flat)):
-            check_finite(array, ("polygons",))
-        return Contours(dimension, flat, *_equal_rings(n, size), largest)
-    if not isinstance(polygons, (list, tuple)):
-        if geometry_of(polygons) is None:
-            raise InvalidArrayError(
-                f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
-                ("polygons",),
-            )
-        polygons = as_solids(polygons, "polygons")
-    rings: list[FloatArray] = []
-    counts: list[int] = []
-    for i, polygon in enumerate(polled(polygons)):
-        if not isinstance(polygon, Polygon) and geometry_of(polygon) is not None:  # pieces of overlays are tuples
-            polygon = as_solid(polygon, "polygons", i)
-        if isinstance(polygon, Polygon):
-            if polygon.dimension != dimension:
-                check_dimension(polygon.dimension, dimension, ("polygons", i))
-            n_rings = len(polygon.ring_offsets) - 1
-            own = [polygon.vertices] if n_rings == 1 else np.split(polygon.vertices, polygon.ring_offsets[1:-1])
-        elif isinstance(polygon, (list, tuple)) or (isinstance(polygon, np.ndarray) and polygon.ndim == 3):
-            own = [as_points(ring, dimension, ("polygons", i, j)) for j, ring in enumerate(polygon)]
-        else:
-            raise InvalidArrayError(
-                f"polygons[{i}] must be a Polygon or a list of rings, got {type(polygon).__name__}", ("polygons", i)
-            )
-        if not own:
-            raise EmptyGeometryError(f"polygons[{i}] has no rings; leave it out", ("polygons", i))
-        for j, ring in enumerate(own):
-            if not len(ring):
-                raise EmptyGeometryError(f"polygons[{i}][{j}] has no vertices; leave it out", ("polygons", i, j))
-        rings += own
-        counts.append(len(own))
-    vertices = np.concatenate(rings).reshape(-1) if rings else np.zeros(0)
-    return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), _size_of(vertices))
-
-
-def _size_of(vertices: FloatArray) -> float:
-    """Return `Contours.size`."""
-    square = np.vdot(vertices, vertices) if len(vertices) <= _FEW else 0.0
-    return sqrt(square) if _USUAL[0] < square < _USUAL[1] else largest_of(vertices)
 
 
 def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArray:
@@ -371,7 +291,7 @@ def _clip(
     arithmetic."""
     d, vertices, ring_offsets, polygon_offsets, size = contours
     scene = kernel_scene(plan, vertices, size, budget.check)
-    if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
+    if scene is not None and scene.exponent == 0 and len(vertices) <= FEW:
         few = _clip_few(vertices, scene.tables, ring_offsets, polygon_offsets, budget)
         if few is not None:
             if progress is not None and len(few[0]):
