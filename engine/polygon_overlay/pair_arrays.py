@@ -117,6 +117,8 @@ def ring_sizes(rings: PairResults) -> FloatArray:
     return cast("FloatArray", (high / 2 - low / 2).sum(axis=1))
 
 
+_FEW: Final = 16
+"""Number of polygons up to which each is compared as bytes; of more only those of equal sizes and first vertices."""
 _LEAST: Final = 3
 """Smallest number of positions of a ring with area."""
 
@@ -150,16 +152,23 @@ class PolygonArrays(NamedTuple):
     def without_repeats(self) -> PolygonArrays:
         """Return the polygons with those that equal an earlier one, number by number, without rings."""
         sizes = self.sizes()
-        filled = np.flatnonzero(sizes)
-        keys = np.column_stack([self.vertices[self.ring_offsets[self.polygon_offsets[filled]]], sizes[filled]])
-        order = np.lexsort(keys.T)
-        is_alike = np.append(False, (keys[order[1:]] == keys[order[:-1]]).all(axis=1))[: len(order)]
-        stays, known = np.ones(len(sizes), np.bool_), set[tuple[bytes, bytes]]()
-        for number in np.sort(filled[order[is_alike | np.append(is_alike[1:], False)[: len(order)]]]).tolist():
+        alike = np.flatnonzero(sizes)
+        if len(alike) > _FEW:
+            keys = np.column_stack([self.vertices[self.ring_offsets[self.polygon_offsets[alike]]], sizes[alike]])
+            order = np.lexsort(keys.T)
+            is_alike = np.append(False, (keys[order[1:]] == keys[order[:-1]]).all(axis=1))
+            alike = np.sort(alike[order[is_alike | np.append(is_alike[1:], False)]])
+        repeats, known = [], set[tuple[bytes, bytes]]()
+        for number in alike.tolist():
             ends = self.ring_offsets[self.polygon_offsets[number] : self.polygon_offsets[number + 1] + 1]
             rings = self.vertices[ends[0] : ends[-1]].tobytes(), (ends - ends[0]).tobytes()
-            stays[number] = rings not in known
+            if rings in known:
+                repeats.append(number)
             known.add(rings)
+        if not repeats:
+            return self
+        stays = np.ones(len(sizes), np.bool_)
+        stays[repeats] = False
         return self.restricted(stays)
 
     def restricted(self, stays: BoolArray) -> PolygonArrays:
