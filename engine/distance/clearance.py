@@ -104,8 +104,8 @@ def clearance(
     Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
     points given may be a little nearer or further. Poses are exact images, as for `collide`.
 
-    Cost: boxes along the axes, balls and half-spaces some 4 us, convex bodies of up to 100 faces 6, small bodies of the
-    plane 8. Others both trees, built once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers
+    Cost: boxes along the axes, balls and half-spaces some 4 us, convex bodies of up to 100 faces 6 (parallel ones apart
+    along axes too), small bodies of the plane 8. Others both trees, built once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers
     for ties. Where sums of coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
 
     For many poses of one pair use `clearance_poses`.

@@ -24,7 +24,8 @@ from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays, rotate
 from engine.collision.result import Clearance, Feature, Poses
-from engine.compiling.jit import entry_of, inline, kernel, merged
+from engine.compiling.jit import called, entry_of, inline, kernel, merged
+from engine.distance.across_axes import nearest_across
 from engine.distance.closed_forms import Wide3, less3
 from engine.distance.convex_gaps import (
     FOUND,
@@ -194,6 +195,17 @@ def nearest_of_convex(
     """Return the distance of two convex bodies, the nearest double, and fill points (2, 3) with the nearest points and
     row (4,) with a triangle and the code of the feature in it of each body; NaN where any of it is unproven. Of several
     triangles the first is named."""
+    a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
+    distance = _only_nearest(first, first_pose, second, second_pose, points, row)
+    return distance if distance > 0.0 else nearest_across(a, first.triangles, b, second.triangles, points, row)
+
+
+@called
+def _only_nearest(
+    first: ConvexArrays, first_pose: PoseArrays, second: ConvexArrays, second_pose: PoseArrays, points: FloatArray,
+    row: IntArray,
+) -> float:  # fmt: skip
+    """As `nearest_of_convex`, where only one pair of points is nearest."""
     a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
     how, simplex = walk(a, b, difference_of_centers(first, 0, a, second, 0, b), np.inf, True)
     if how != FOUND:

@@ -1,0 +1,253 @@
+"""Nearest points of two convex bodies that lie apart along axes: flush boxes, plates, parts on one lattice.
+
+If all of one body has x <= a, and all of the other x >= b > a, these planes are the walls of a gap, and no points are
+nearer than b - a. On every axis with a gap both coordinates are bounded so; points on all walls, and straight across on
+the other axes, are exactly as near as the gaps allow. Triangles that have some on the walls are compared as the points,
+edges and triangles that they have there, seen along the gaps, in the order of their faces: the first two with a common
+point are the answer, which is a corner of one of them. Where only edges cross, or none meet, nothing is proven.
+
+Exact: images of vertices are doubles, which is tested, and signs are those of `orient2d`.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from engine.collision.convex_body import point_of
+from engine.collision.convex_pair import PlacedBody
+from engine.collision.meshes.near_triangles import FACE
+from engine.collision.meshes.placement import Placement, placed
+from engine.compiling.jit import called, inline
+from engine.distance.closed_forms import Wide, less, over, plus, root, times
+from engine.predicates.error_free import U2, is_correctly_rounded, two_diff, two_sum
+from engine.predicates.orientation import orient2d
+from engine.types import UNDECIDED, FloatArray, IntArray, Point2, Point3
+
+_OUTSIDE, _UNKNOWN = -1, -2
+_SMALLEST, _LARGEST = 2.0**-400, 2.0**400
+"""Range of coordinates that are not 0, and of gaps: squares neither underflow nor overflow."""
+_BOUND: Final = 64.0 * U2
+"""Of a root of squares, less two radii, and of a point moved by a radius, times the numbers: 32 u^2 for the root
+(`closed_forms.py`), 16 u^2 for the quotient, 5 for the product, 4 a sum."""
+
+
+class Part(NamedTuple):
+    """What a triangle has on the walls: n corners, of which k and l are the first two."""
+
+    n: int
+    k: int
+    l: int  # noqa: E741
+
+
+@inline
+def _turns_axes(place: Placement) -> bool:
+    """Return whether a rotation only permutes axes and flips signs."""
+    for row in (place.x, place.y, place.z):
+        for entry in (row.x, row.y, row.z):
+            if entry != 0.0 and abs(entry) != 1.0:
+                return False
+    return True
+
+
+@inline
+def _are_images_exact(f: PlacedBody) -> bool:
+    """Return whether no coordinate of a vertex is rounded by the pose of its body, or out of range."""
+    if not _turns_axes(f.place):
+        return False
+    move, zero = f.place.shift, Point3(0.0, 0.0, 0.0)
+    turn = Placement(f.place.x, f.place.y, f.place.z, zero, f.place.is_posed, 0.0)
+    for vertex in range(f.first, f.stop):
+        v = placed(point_of(f.points, vertex), turn)
+        for x, shift in ((v.x, move.x), (v.y, move.y), (v.z, move.z)):
+            image, rest = two_sum(x, shift)
+            if rest != 0.0 or not (image == 0.0 or _SMALLEST < abs(image) < _LARGEST):
+                return False
+    return True
+
+
+@inline
+def _corner(f: PlacedBody, triangles: IntArray, item: int, k: int) -> Point3:
+    """Return corner k of a triangle of a body, or the centre of a ball, which has no triangles."""
+    return placed(point_of(f.points, triangles[item, k] if triangles.shape[0] > 0 else f.first), f.place)
+
+
+@inline
+def _box_of(f: PlacedBody) -> tuple[Point3, Point3]:
+    """Return the low and high corners of the box of a body without its radius."""
+    low = high = placed(point_of(f.points, f.first), f.place)
+    for vertex in range(f.first + 1, f.stop):
+        p = placed(point_of(f.points, vertex), f.place)
+        low = Point3(min(low.x, p.x), min(low.y, p.y), min(low.z, p.z))
+        high = Point3(max(high.x, p.x), max(high.y, p.y), max(high.z, p.z))
+    return low, high
+
+
+@inline
+def _walls_along(low: float, high: float, other_low: float, other_high: float) -> tuple[float, float, bool]:
+    """Return the walls of both bodies on an axis, and whether there is a gap between them."""
+    if other_low > high:
+        return high, other_low, True
+    return low, other_high, low > other_high
+
+
+@inline
+def _part_of(f: PlacedBody, triangles: IntArray, item: int, wall: Point3, gaps: tuple[bool, bool, bool]) -> Part:
+    """Return what a triangle of a body has on its walls, which are read on axes with gaps only."""
+    n, k, other = 0, 0, 0
+    for corner in range(3 if triangles.shape[0] > 0 else 1):
+        p = _corner(f, triangles, item, corner)
+        if (p.x == wall.x or not gaps[0]) and (p.y == wall.y or not gaps[1]) and (p.z == wall.z or not gaps[2]):
+            k, other = (corner if n == 0 else k), (corner if n == 1 else other)
+            n += 1
+    return Part(n, k, other)
+
+
+@inline
+def _seen(p: Point3, gaps: tuple[bool, bool, bool]) -> Point2:
+    """Return a point as seen along the axes with gaps: its coordinates on two other axes, 0.0 in place of one."""
+    x, y, z = 0.0 if gaps[0] else p.x, 0.0 if gaps[1] else p.y, 0.0 if gaps[2] else p.z
+    return Point2(y, z) if gaps[0] else (Point2(x, z) if gaps[1] else Point2(x, y))
+
+
+@inline
+def _number(part: Part, place: int) -> int:
+    """Return the corner of the triangle that is number ``place`` of its part."""
+    return part.k if place == 0 else (part.l if place == 1 else 2)
+
+
+@called
+def _code_at(t: Point2, part: Part, a: Point2, b: Point2, c: Point2) -> int:
+    """Return the code of the feature of a triangle on which t lies, _OUTSIDE if it is on none, or _UNKNOWN. a, b, c:
+    the corners of its part."""
+    if part.n == 1 or (t.x == a.x and t.y == a.y):
+        return part.k if t.x == a.x and t.y == a.y else _OUTSIDE
+    if part.n == 2:
+        if t.x == b.x and t.y == b.y:
+            return part.l
+        side = orient2d(a, b, t)
+        if side == UNDECIDED:
+            return _UNKNOWN
+        is_between = min(a.x, b.x) <= t.x <= max(a.x, b.x) and min(a.y, b.y) <= t.y <= max(a.y, b.y)
+        return (3 + (part.k if part.l == part.k + 1 else part.l)) if side == 0 and is_between else _OUTSIDE
+    turn, ab, bc, ca = orient2d(a, b, c), orient2d(a, b, t), orient2d(b, c, t), orient2d(c, a, t)
+    if turn == 0 or UNDECIDED in (turn, ab, bc, ca):
+        return _UNKNOWN
+    if min(turn * ab, turn * bc, turn * ca) < 0:
+        return _OUTSIDE
+    if ab == 0:
+        return 1 if bc == 0 else 3
+    if bc == 0:
+        return 2 if ca == 0 else 4
+    return 5 if ca == 0 else FACE
+
+
+@called
+def _may_cross(a: Point2, b: Point2, p: Point2, q: Point2) -> bool:
+    """Return whether the inner points of two edges cross in one point, True also if that is unknown."""
+    first, second, third, fourth = orient2d(a, b, p), orient2d(a, b, q), orient2d(p, q, a), orient2d(p, q, b)
+    if UNDECIDED in (first, second, third, fourth):
+        return True
+    return first * second < 0 and third * fourth < 0
+
+
+@inline
+def _common_corner(
+    own: Part, a: tuple[Point2, Point2, Point2], their: Part, b: tuple[Point2, Point2, Point2]
+) -> tuple[int, int, bool]:
+    """Return the codes of two features that have a corner of either part in common, and whether it is one of the first;
+    _OUTSIDE if the parts have no common point, _UNKNOWN if that is not proven. a, b: corners of the parts."""
+    for place in range(own.n):
+        code = _code_at(a[place], their, b[0], b[1], b[2])
+        if code != _OUTSIDE:
+            return _number(own, place), code, True
+    for place in range(their.n):
+        code = _code_at(b[place], own, a[0], a[1], a[2])
+        if code != _OUTSIDE:
+            return code, _number(their, place), False
+    for i in range(own.n if own.n != 2 else 1):
+        for j in range(their.n if their.n != 2 else 1):
+            if own.n > 1 and their.n > 1 and _may_cross(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]):
+                return _UNKNOWN, _UNKNOWN, True
+    return _OUTSIDE, _OUTSIDE, True
+
+
+@inline
+def _moved(x: float, gap: Wide, size: Wide, radius: float) -> tuple[float, bool]:
+    """Return x moved by a radius times gap / size, rounded, and whether it is the nearest double."""
+    if radius == 0.0 or gap.h == 0.0:
+        return x + 0.0, True
+    if abs(gap.h) == size.h and gap.low == size.low * (1.0 if gap.h > 0.0 else -1.0):
+        return (x + radius if gap.h > 0.0 else x - radius) + 0.0, True
+    step = times(over(gap, size), Wide(radius, 0.0))
+    end = plus(Wide(x, 0.0), step)
+    return end.h, is_correctly_rounded(end.h, end.low, _BOUND * (abs(x) + radius))
+
+
+@called
+def nearest_across(
+    a: PlacedBody, triangles: IntArray, b: PlacedBody, other_triangles: IntArray, points: FloatArray, row: IntArray
+) -> float:
+    """Return the distance of two convex bodies and fill points (2, 3) and row (4,), as `nearest_of_convex` does; NaN
+    where they do not lie apart along axes, or any of it is unproven."""
+    if not (_are_images_exact(a) and _are_images_exact(b)):
+        return np.nan
+    (low, high), (other_low, other_high) = _box_of(a), _box_of(b)
+    x, other_x, has_x = _walls_along(low.x, high.x, other_low.x, other_high.x)
+    y, other_y, has_y = _walls_along(low.y, high.y, other_low.y, other_high.y)
+    z, other_z, has_z = _walls_along(low.z, high.z, other_low.z, other_high.z)
+    wall, other, gaps = Point3(x, y, z), Point3(other_x, other_y, other_z), (has_x, has_y, has_z)
+    if not (has_x or has_y or has_z):
+        return np.nan
+    for i in range(max(1, triangles.shape[0])):
+        own = _part_of(a, triangles, i, wall, gaps)
+        p, q = _corner(a, triangles, i, own.k), _corner(a, triangles, i, own.l)
+        corners = _seen(p, gaps), _seen(q, gaps), _seen(_corner(a, triangles, i, 2), gaps)
+        for j in range(max(1, other_triangles.shape[0]) if own.n > 0 else 0):
+            their = _part_of(b, other_triangles, j, other, gaps)
+            if their.n == 0:
+                continue
+            s, t = _corner(b, other_triangles, j, their.k), _corner(b, other_triangles, j, their.l)
+            others = _seen(s, gaps), _seen(t, gaps), _seen(_corner(b, other_triangles, j, 2), gaps)
+            code, their_code, is_own = _common_corner(own, corners, their, others)
+            if code == _OUTSIDE:
+                continue
+            if code == _UNKNOWN or their_code == _UNKNOWN:
+                return np.nan
+            row[0], row[1] = (i if triangles.shape[0] > 0 else -1), code
+            row[2], row[3] = (j if other_triangles.shape[0] > 0 else -1), their_code
+            at = _corner(a, triangles, i, code) if is_own else _corner(b, other_triangles, j, their_code)
+            return _measured(at, wall, other, gaps, (a.round, b.round), points)
+    return np.nan
+
+
+@called
+def _measured(
+    at: Point3, wall: Point3, other: Point3, gaps: tuple[bool, bool, bool], radii: tuple[float, float],
+    points: FloatArray,
+) -> float:  # fmt: skip
+    """Return the distance of two bodies and fill points (2, 3); NaN where a double is unproven. at: a nearest point of
+    either centre or hull, which both have but for the axes with gaps."""
+    none = Wide(0.0, 0.0)
+    x = Wide(*two_diff(other.x, wall.x)) if gaps[0] else none
+    y = Wide(*two_diff(other.y, wall.y)) if gaps[1] else none
+    z = Wide(*two_diff(other.z, wall.z)) if gaps[2] else none
+    is_one = int(gaps[0]) + int(gaps[1]) + int(gaps[2]) == 1
+    size = plus(plus(x, y), z)
+    if is_one:
+        size = size if size.h > 0.0 else less(none, size)
+    else:
+        size = root(plus(plus(times(x, x), times(y, y)), times(z, z)))
+    distance = less(less(size, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
+    bound = 0.0 if is_one and radii[0] == 0.0 and radii[1] == 0.0 else _BOUND * (size.h + radii[0] + radii[1])
+    sure = _SMALLEST < size.h < _LARGEST and distance.h > _SMALLEST
+    sure = sure and is_correctly_rounded(distance.h, distance.low, bound)
+    for axis, p, q, at_x, gap, has_gap in (
+        (0, wall.x, other.x, at.x, x, gaps[0]), (1, wall.y, other.y, at.y, y, gaps[1]),
+        (2, wall.z, other.z, at.z, z, gaps[2]),
+    ):  # fmt: skip
+        points[0, axis], is_first = _moved(p if has_gap else at_x, gap, size, radii[0])
+        points[1, axis], is_second = _moved(q if has_gap else at_x, less(none, gap), size, radii[1])
+        sure = sure and is_first and is_second
+    return distance.h if sure else np.nan
