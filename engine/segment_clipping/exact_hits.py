@@ -14,7 +14,7 @@ import numpy as np
 from engine.predicates.rational import Number, common_integers, cross, dot, minus, nearest_with_root
 from engine.segment_clipping.exact_pieces import LAST, Contact, contacts_of
 from engine.segment_clipping.hit_search import ACROSS, ALONG, END, RIM, TOUCH
-from engine.segment_clipping.profiles import LARGEST, _near
+from engine.segment_clipping.profiles import LARGEST, near_boxes
 from engine.types import FlagArray, FloatArray
 
 
@@ -114,7 +114,7 @@ def _weights(x: Sequence[Any], corners: Sequence[Sequence[int]]) -> list[Fractio
 def near_elements(elements: FloatArray, p: Sequence[Number], way: Sequence[Number], is_ray: bool) -> Any:
     """Return the indices of the triangles (k, 3, 3) whose boxes a line, or the boxes of a ray's axes, may meet."""
     if not is_ray:
-        return _near(elements, p, [Fraction(x) + Fraction(d) for x, d in zip(p, way)])
+        return near_boxes(elements, p, [Fraction(x) + Fraction(d) for x, d in zip(p, way)])
     apart = np.zeros(len(elements), np.bool_)
     for k, (x, d) in enumerate(zip(p, way)):
         at = float(max(min(x, LARGEST), -LARGEST))

@@ -41,7 +41,7 @@ from engine.segment_clipping.exact_pieces import (
 )
 from engine.segment_clipping.on_boundary.contacts import Bit
 from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with
-from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline, boundary_of
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
 from engine.solids.base import Solid
 from engine.solids.csg import Csg
@@ -55,6 +55,8 @@ OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 _BYTES: Final = 1000
 """Memory counted for a piece as a Python object."""
 LARGEST: Final = float(np.finfo(np.float64).max)
+_FAR: Final = 2.0**1000
+"""Size from which all boxes are compared with a segment that is rounded: its bounds could overflow."""
 Point = Sequence[Number]
 
 
@@ -348,11 +350,7 @@ def on_boundary(line: Line, solid: Any) -> list[Node]:
 def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget) -> Iterator[Contact]:
     """Yield the exact contacts of segment p q, in the solid's own frame, with the solid's edges or triangles."""
     boundary = boundary_of(solid)
-    if pose is None and list(p) != list(q):
-        near, kinds, _ = contacts_with(np.array([[p, q]], np.float64), boundary, budget)
-        near = near[kinds & np.uint8(Bit.CEASES) == 0]  # each element once
-    else:
-        near = _near(boundary.elements, p, q)
+    near = _near(boundary, p, q, pose is None, budget)
     n = len(p)
     corners = boundary.elements[near]
     flat, _ = common_integers([*p, *q, *corners.ravel().tolist()])
@@ -364,7 +362,20 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
     return contacts_of(points[0], points[1], elements, budget.check)
 
 
-def _near(elements: FloatArray, p: Point, q: Point) -> Any:
+def _near(boundary: Outline | Mesh, p: Point, q: Point, are_floats: bool, budget: Budget) -> Any:
+    """Return the indices of the elements of a boundary that a segment p q of rationals may meet. are_floats: whether
+    all its coordinates are."""
+    if are_floats or isinstance(boundary, Mesh):
+        rounded = np.array([[[float(x) if abs(x) <= LARGEST else np.inf for x in end] for end in (p, q)]])
+        size = float(np.abs(rounded).max())
+        if (are_floats or size < _FAR) and (rounded[0, 0] != rounded[0, 1]).any():
+            blur = 0.0 if are_floats else 2.0**-52 * size + 2.0**-1000
+            near, kinds, _ = contacts_with(rounded, boundary, budget, blur)
+            return near[kinds & np.uint8(Bit.CEASES) == 0]  # each element once
+    return near_boxes(boundary.elements, p, q)
+
+
+def near_boxes(elements: FloatArray, p: Point, q: Point) -> Any:
     """Return the indices of the elements (k, corners, dim) whose boxes a segment p q of rationals may meet; its box is
     rounded outward."""
     with np.errstate(all="ignore"):  # what is no number, as beyond doubles, keeps an element

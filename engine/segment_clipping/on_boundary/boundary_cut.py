@@ -381,7 +381,7 @@ def cut_on_mesh(
     last, n_ready, n[1] = n[0], 1, 0
     while n[0] == last < locations.shape[0] and n_ready > 0:
         group = segments[last : last + size]
-        n_ready = gather_triangles(contacts, mesh, group, group.shape[0], stop)
+        n_ready = gather_triangles(contacts, mesh, group, group.shape[0], 0.0, stop)
         for item in range(n_ready):
             if _needs_location_before(contacts, item, locations[last + item]):
                 p, q, waiting = corner(group, item, 0), corner(group, item, 1), contacts.waiting

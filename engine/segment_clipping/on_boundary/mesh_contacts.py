@@ -246,16 +246,16 @@ def append_contacts(
 
 
 @called
-def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
+def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, blur: float, stop: FlagArray) -> int:
     """Fill `contacts` with those of the first n of segments (m, 2, 3) and the triangles of a `Mesh`; return the number
-    of segments for which there is room. Ends early if `stop` (one uint8) is set."""
+    of segments for which there is room. blur: as in `append_contacts`. Ends early if `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
         if not are_same(segments[i], 0, segments[i], 1):
             p, q = corner(segments, i, 0), corner(segments, i, 1)
             n_met = append_contacts(
-                mesh, p, q, 0.0, False, False, contacts.waiting, contacts.met, contacts.kinds, n_met
+                mesh, p, q, blur, False, False, contacts.waiting, contacts.met, contacts.kinds, n_met
             )
         contacts.offsets[i + 1] = n_met
         if n_met < 0 or stop[0]:
@@ -264,12 +264,14 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
 
 
 @allocating_kernel
-def find_contacts_3d(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
+def find_contacts_3d(
+    segments: FloatArray, mesh: Mesh, blur: float, stop: FlagArray, room: int
+) -> tuple[int, Any, Any, Any]:
     """Return (number, met, kinds, offsets): the contacts of at most GROUP segments (n, 2, 3) float64 with triangles,
-    segment by segment. met int64: the elements; kinds uint8: `Kind` or code; offsets (n + 1,) of segments. The number
-    is NO_ROOM if there are more than `room`, or `stop` (one uint8) is set."""
+    segment by segment. blur: as in `append_contacts`; met int64: the elements; kinds uint8: `Kind` or code; offsets (n
+    + 1,) of segments. The number is NO_ROOM if there are more than `room`, or `stop` (one uint8) is set."""
     n, contacts = segments.shape[0], allocate_contacts(segments.shape[0], room, traversal_buffers())
-    n_met = contacts.offsets[n] if gather_triangles(contacts, mesh, segments, n, stop) == n else NO_ROOM
+    n_met = contacts.offsets[n] if gather_triangles(contacts, mesh, segments, n, blur, stop) == n else NO_ROOM
     return n_met, contacts.met, contacts.kinds, contacts.offsets
 
 
@@ -279,15 +281,18 @@ _EACH: Final = 8
 
 
 def contacts_with(
-    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
+    segments: FloatArray, boundary: Outline | Mesh, budget: Budget, blur: float = 0.0
 ) -> tuple[IntArray, FlagArray, IntArray]:
     """Return (met, kinds, offsets) for segments (n <= GROUP, 2, dim): the elements that each meets or may meet, segment
-    by segment; the `Kind` or code of each contact; and the offsets (n + 1,) of segments."""
-    kernel: Any = find_contacts_3d if isinstance(boundary, Mesh) else find_contacts_2d
+    by segment; the `Kind` or code of each contact; and the offsets (n + 1,) of segments. blur: error of each coordinate
+    of the segments, 0.0 in the plane."""
+    is_flat = not isinstance(boundary, Mesh)
+    kernel: Any = find_contacts_2d if is_flat else find_contacts_3d
+    read = (segments, boundary) if is_flat else (segments, boundary, blur)
     room, n_contacts = _LEAST_CONTACTS + _EACH * len(segments), NO_ROOM
     met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)
     while n_contacts == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
-        n_contacts, met, kinds, offsets = entry_of(kernel)(segments, boundary, budget.flag, room)
+        n_contacts, met, kinds, offsets = entry_of(kernel)(*read, budget.flag, room)
         budget.check()
         room *= 2
     return met[:n_contacts], kinds[:n_contacts], offsets[: len(segments) + 1]

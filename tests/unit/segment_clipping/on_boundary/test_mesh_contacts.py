@@ -53,7 +53,7 @@ def test_contacts_are_those_of_all_triangles() -> None:
     stop, room = np.zeros(1, np.uint8), 100_000
 
     def found(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
-        n_contacts, met, kinds, offsets = find_contacts_3d(segments, mesh, stop, room)
+        n_contacts, met, kinds, offsets = find_contacts_3d(segments, mesh, 0.0, stop, room)
         assert n_contacts == offsets[-1]
         return met, kinds, offsets
 
