@@ -131,6 +131,18 @@ def build_stretched_bvh(boxes: FloatArray) -> tuple[Bvh, FloatArray, FloatArray]
     return tree, read_only(tree.origin / stretch), read_only(tree.scale / stretch)
 
 
+def build_balanced_bvh(boxes: FloatArray) -> Bvh:
+    """Return the tree of `build_bvh` over boxes (n_items, 6), which are overwritten, with runs split as if all axes had
+    similar extents (`_stretch`): by the surface area of a long thin mesh, nodes would be wide across its short axes."""
+    tree, origin, scale = build_stretched_bvh(boxes)
+    if (scale == tree.scale).all():
+        return tree
+    narrowed = tree.boxes * np.tile(scale / tree.scale, 2).astype(np.float32)[:, None]
+    np.maximum(narrowed[:, 3:], np.float32(LEAST), out=narrowed[:, 3:])
+    narrowed = np.where(tree.child[:, None] == EMPTY, tree.boxes, narrowed)
+    return Bvh(cache_aligned(narrowed), tree.child, origin, tree.scale)
+
+
 @kernel
 def _stretch(boxes: FloatArray, stretch: FloatArray) -> None:
     """Multiply boxes (n, 6) by `stretch` (3,), ones on entry: powers of two, up to 2^_MOST_STRETCH, for axes that are

@@ -8,14 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from typing import TypeVar
+
+import numpy as np
 
 from engine.containment.methods.rational_locate import adjugate, to_world_frame
 from engine.predicates.rational import dot
+from engine.solids.mesh import Mesh
+from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
 from engine.solids.primitives import HalfSpace
+from engine.types import read_only
 
 Vector = tuple[Fraction, ...]
 Point = Iterable[float | Fraction]
+Outlined = TypeVar("Outlined", bound=Mesh | Polygon)
 HalfSpaceImage = tuple[Vector, Fraction]
 """Normal n and offset d of the half-space n . x + d >= 0."""
 
@@ -29,6 +36,24 @@ def image_point(point: Point, pose: Pose | None) -> Vector:
     """Return the exact image of a point under a pose."""
     p = as_vector(point)
     return p if pose is None else tuple(to_world_frame(p, pose))
+
+
+def image_in_doubles(solid: Outlined, pose: Pose) -> Outlined | None:
+    """Return the image of a mesh or polygon under a pose as a solid without one, if the pose permutes axes, up to sign,
+    and every moved vertex is a double; else None."""
+    sizes, step = np.abs(pose.rotation), pose.translation
+    if not ((sizes == 0.0) | (sizes == 1.0)).all():
+        return None
+    turned = solid.vertices @ pose.rotation.T
+    with np.errstate(all="ignore"):
+        moved = turned + step
+        rest = moved - turned
+        lost = (turned - (moved - rest)) + (step - rest)
+    if not (lost == 0.0).all():  # what overflows has lost no number
+        return None
+    image = object.__new__(type(solid))
+    image._set(**{name: getattr(solid, name) for name in solid._fields()} | {"vertices": read_only(moved + 0.0)})
+    return image
 
 
 def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage:

@@ -1,7 +1,7 @@
 """Segments through a scene: the kernels (segment_kernels.py), then the exact fallback for what they leave open.
 
-An unposed body then clips a segment as `clip_segments`; posed ones, CSG trees and prisms in exact arithmetic
-(profiles.py).
+An unposed body, and one whose posed vertices are doubles, then clips a segment as `clip_segments`; other posed ones, CSG
+trees and prisms in exact arithmetic (profiles.py).
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exac
     def pieces(source: int, body: int) -> list[ExactPiece]:
         budget.check()
         p, q = segments[source].tolist()
-        return exact_pieces(p, q, *scene.placed(body), budget)
+        return exact_pieces(p, q, *scene.placed_exactly(body, 0, budget), budget)
 
     return lambda source, body, number: (pieces(source, body)[number].first, pieces(source, body)[number].last)
 
@@ -257,7 +257,8 @@ def _cut(
         for group in range(first, last):
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
-            pieces, rational, is_known = _on_body(read_only(segments[items]), *scene.placed(body), budget)
+            placed = scene.placed_exactly(body, end - begin, budget)
+            pieces, rational, is_known = _on_body(read_only(segments[items]), *placed, budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:

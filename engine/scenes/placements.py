@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.collision.exact_images import image_in_doubles
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.locators import Locator
 from engine.running.budget import UNLIMITED, Budget
@@ -21,6 +22,7 @@ from engine.scenes.near_boxes import PLACED, Where, bodies_in, place_in, scratch
 from engine.scenes.table import unready
 from engine.solids.base import Preparing, Solid
 from engine.solids.mesh import Polyhedron
+from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
 from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 
@@ -30,6 +32,9 @@ _PART: Final = 4
 own."""
 _LISTED: Final = 128
 """Most moved bodies whose boxes are tested one by one, which is as fast as building a tree."""
+_PAID_BY_SEGMENT: Final = 256
+"""Vertices of which an image, and the tree over it, cost as much as exact arithmetic on a segment."""
+_NO_IMAGE: Final = ()
 _NO_WORDS: Final = [0] * (PLACED + 1)
 
 
@@ -58,7 +63,12 @@ class Placements(Preparing):
     def all_cached(self) -> list[Any]:
         """The structures cached so far, to count their memory."""
         others = (self.cached("few"), self.cached("whole"))
-        return [self.base._prepared, self._placed, *(each._prepared for each in others if each is not None)]
+        return [
+            self.base._prepared,
+            self._prepared,
+            self._placed,
+            *(each._prepared for each in others if each is not None),
+        ]
 
     def after(self, poses: Mapping[int, Pose | None]) -> Placements:
         """Return the placements after the bodies of `poses`, in ascending order, were moved."""
@@ -93,6 +103,18 @@ class Placements(Preparing):
         """Return a body's solid and its current pose, None for the identity."""
         pose = self.pose(body)
         return self.base.solids[body], None if pose is None or pose.is_identity else pose
+
+    def placed_exactly(self, body: int, n: int, budget: Budget) -> tuple[Solid, Pose | None]:
+        """Return a body's solid and its current pose, for n segments that kernels leave open; if so many pay for it,
+        and it is one (`image_in_doubles`), the solid's image and None."""
+        solid, pose = self.placed(body)
+        if pose is None or not isinstance(solid, Polyhedron | Polygon):
+            return solid, pose
+        owner, key = (self if body in self.moved else self.base), f"image {body}"
+        image = owner.cached(key)
+        if image is None and n * _PAID_BY_SEGMENT >= len(solid.vertices):
+            image = owner.prepared(key, lambda: image_in_doubles(solid, pose) or _NO_IMAGE, budget.check)
+        return (solid, pose) if image is None or image is _NO_IMAGE else (image, None)
 
     def names_of(self, bodies: IntArray) -> IntArray:
         """Return the scene's indices for body numbers of kernels, which number moved bodies from n on."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
 from engine.bounding.aabb import corners_of_box, fill_discs
-from engine.bounding.bvh import WIDTH, build_bvh
+from engine.bounding.bvh import WIDTH, build_balanced_bvh
 from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Facet, facet_at, projected
 from engine.compiling.jit import allocating_kernel, inline, kernel
@@ -119,7 +119,7 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     n_triangles = len(triangles)
     boxes = np.empty((n_triangles, 6))
     fill_triangle_boxes(vertices, triangles, boxes)
-    tree = build_bvh(boxes)
+    tree = build_balanced_bvh(boxes)
     child, order = tree.child.copy(), np.empty(n_triangles, np.int64)
     ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
     used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
