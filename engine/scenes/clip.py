@@ -1,7 +1,7 @@
 """Segments through a scene: the kernels (segment_kernels.py), then the exact fallback for what they leave open.
 
-An unposed body, and one whose posed vertices are doubles, then clips a segment as `clip_segments`; other posed ones, CSG
-trees and prisms in exact arithmetic (profiles.py).
+An unposed body, and one whose posed vertices are doubles, then clips a segment as `clip_segments`; other posed ones,
+CSG trees and prisms in exact arithmetic (profiles.py).
 """
 
 from __future__ import annotations

@@ -366,7 +366,7 @@ def _near(boundary: Outline | Mesh, p: Point, q: Point, are_floats: bool, budget
     """Return the indices of the elements of a boundary that a segment p q of rationals may meet. are_floats: whether
     all its coordinates are."""
     if are_floats or isinstance(boundary, Mesh):
-        rounded = np.array([[[float(x) if abs(x) <= LARGEST else np.inf for x in end] for end in (p, q)]])
+        rounded = np.array([[[float(x) if -LARGEST <= x <= LARGEST else np.inf for x in end] for end in (p, q)]])
         size = float(np.abs(rounded).max())
         if (are_floats or size < _FAR) and (rounded[0, 0] != rounded[0, 1]).any():
             blur = 0.0 if are_floats else 2.0**-52 * size + 2.0**-1000

@@ -241,6 +241,29 @@ def _plane_sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tu
     return int(one > bound) - int(one < -bound), int(other > bound) - int(other < -bound)
 
 
+_TURNS = 8
+
+
+@called
+def _are_parted(v: Point3, w: Point3, x: Point3, y: Point3, error: float) -> bool:
+    """Return whether a plane through the origin is proven to part v and w from x and y strictly; its normal n is that
+    of a perceptron (`separated.py`). error: bound on each coordinate; a product n . v is off by at most |n|_1 (2^-50
+    |v| + error), of which twice is allowed."""
+    n, are_parted = Point3(0.0, 0.0, 0.0), False
+    for _ in range(_TURNS):
+        are_parted = True
+        for k in range(4):
+            u, side = (v, 1.0) if k == 0 else (w, 1.0) if k == 1 else (x, -1.0) if k == 2 else (y, -1.0)
+            size = largest_of(u)
+            bound = (2.0**-49 * size + 2.0 * error) * (abs(n.x) + abs(n.y) + abs(n.z)) + 2.0**-1000
+            if not side * dot(n, u) > bound:
+                are_parted, side = False, side / size
+                n = Point3(n.x + side * u.x, n.y + side * u.y, n.z + side * u.z)
+        if are_parted:
+            break
+    return are_parted
+
+
 @merged
 def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
     """Return 3 k + m if corner k of t and corner m of u are proven to be one point, and the only common point; else -1.
@@ -248,7 +271,8 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
     t, u: rounded posed triangles, each coordinate within `error`. own, their: the same before their poses. Proof: the
     vectors v, w from the common corner to the other corners of t lie strictly on one side of the plane of u, or those
     of u, x and y, on one side of the plane of t; or both faces straddle, and leave the corner along the common line in
-    opposite directions. With normals m of t and n of u these are (m x n) sign(n . v), and (n x m) sign(m . x)."""
+    opposite directions; or a plane parts v and w from x and y. With normals m of t and n of u the directions are (m x
+    n) sign(n . v), and (n x m) sign(m . x)."""
     for k in range(3):
         for m in range(3):
             p, q = corner(t, k), corner(u, m)
@@ -259,7 +283,8 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
             by_x, by_y = _plane_sides(v, w, x, y, error)
             if by_x * by_y != 1:
                 by_v, by_w = _plane_sides(x, y, v, w, error)
-                if by_v * by_w == 0 or (by_v * by_w < 0 and (by_x * by_y == 0 or by_v != by_x)):
+                is_open = by_v * by_w == 0 or (by_v * by_w < 0 and (by_x * by_y == 0 or by_v != by_x))
+                if is_open and not _are_parted(v, w, x, y, 2.0 * error):
                     return -1
             return 3 * k + m if error == 0.0 or are_equal_exact(poses, corner(own, k), corner(their, m)) else -1
     return -1

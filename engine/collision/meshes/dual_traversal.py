@@ -14,11 +14,9 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import NamedTuple
 
-import numpy as np
-
 from engine.bounding.bvh import MAX_DEPTH, STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
-from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, insert_sorted
+from engine.collision.meshes.contact_kinds import N_NAMED, common_corner, insert_sorted
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.parity import SIDE_UNKNOWN, inner_side, proves_overlap, state_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
@@ -36,8 +34,8 @@ from engine.collision.meshes.triangle_triangle import (
     with_pose,
 )
 from engine.compiling.jit import called, inline, merged
-from engine.lanes.boxes import FRAME_ROWS, discs_meeting, meeting
-from engine.lanes.faces import WORK_ROWS, faces_meeting
+from engine.lanes.boxes import discs_meeting, meeting
+from engine.lanes.faces import faces_meeting
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
 from engine.predicates.posed import UNPOSED, posed_error
@@ -69,6 +67,8 @@ _N_FIRST, _N_BLOCKS, _N_MORE = 64, 1024, 64
 bodies; after so many, planes of faces (`separating_planes.py`); after a try that separates nothing, again after so many
 more."""
 
+_N_NODES, _N_SAMPLED = 2048, 16
+"""After so many pairs of nodes, and no contact, so many blocks are compared with all of the other body."""
 STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH + STACK
 """Bound on the pairs of nodes on the stack: a pair is replaced by at most 64, one of its nodes a level deeper."""
 
@@ -112,19 +112,6 @@ class Search(NamedTuple):
     seek: int
     contacts: Contacts
     flag: FlagArray
-
-
-def new_descent() -> Descent:
-    """Allocate the work space of one search."""
-    frames, work = np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((WORK_ROWS, LANES), np.float32)
-    return Descent(np.empty((STACK_ROWS, 2), np.int32), frames, work, np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8))
-
-
-def new_contacts(room: int, n_faces: int = 0) -> Contacts:
-    """Allocate room for pairs of faces in contact. n_faces: number of faces of both bodies together if the pairs with
-    only a corner in common are to be selected, 0 if all pairs are listed."""
-    n = room + (N_NAMED if n_faces else 0)
-    return Contacts(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
 
 
 @inline
@@ -350,17 +337,12 @@ def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]
 
 
 @inline
-def pose_number(s: Search, place: Placement, number: int) -> int:
-    """Return ``number`` (0 or 1, the row of ``descent.poses`` that moves a body), or UNPOSED if `exact_faces` gives the
-    body's points as placed since placing rounds nothing."""
-    return UNPOSED if s.place.error == 0.0 or not place.is_posed else number
-
-
-@inline
 def vertices_of(s: Search) -> tuple[Vertices, Vertices]:
-    """Return the vertices of both bodies as input of exact signs."""
-    u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
-    return u, Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
+    """Return the vertices of both bodies as input of exact signs: before their poses, unless `exact_faces` gives the
+    points as placed, since placing rounds nothing."""
+    are_placed, a, b = s.place.error == 0.0, s.place.a, s.place.b
+    u = Vertices(s.first.vertices, a, UNPOSED if are_placed or not a.is_posed else 0)
+    return u, Vertices(s.second.vertices, b, UNPOSED if are_placed or not b.is_posed else 1)
 
 
 @called
@@ -379,12 +361,34 @@ def are_parted(s: Search, i: int, j: int, n_stack: int) -> bool:
     return nodes_are_separated(s.descent.poses, s.first, u, i, s.second, v, j, free, exact_error(s))
 
 
+@called
+def is_decided_by_sample(s: Search, n_stack: int) -> bool:
+    """Return whether some faces of the first body and all of the second have a pair that decides the query, and write
+    it to row 0 of ``s.contacts``. Where boxes overlap that faces do not, as around two apexes, the descent may come to
+    such a pair late. n_stack: pairs on the stack of the search, whose free rows are scratch."""
+    child, stack = s.first.child, s.descent.stack
+    for k in range(_N_SAMPLED):
+        node = k * child.shape[0] // _N_SAMPLED
+        while child[node, 0] >= 0:  # bound: the depth of the tree
+            node = int(child[node, 0])
+        stack[n_stack, 0], stack[n_stack, 1] = node, 0
+        top = n_stack + 1
+        while top > n_stack and s.flag[0] == 0:  # bound: each node of the second tree enters once
+            top -= 1
+            i, j = int(stack[top, 0]) + 0, int(stack[top, 1]) + 0
+            top, low, high = expand_pair(s, i, j, top)
+            how = classify_faces(s, Progress(top, i, j, low, high), 0, -1)[0]
+            if how != DONE:
+                return how == SETTLED
+    return False
+
+
 @merged
 def search(s: Search, start: Progress, n_pairs: int, pause: int) -> tuple[int, int, Progress]:
     """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...), the number of pairs, which
     may exceed the room, and how far the search is. SETTLED: the one pair that decides the query stands in row 0. start:
     START, or where a search paused that had listed n_pairs; pause: number of pairs at which to pause."""
-    stack, at, n_blocks, next_try = s.descent.stack, start, 0, _N_BLOCKS
+    stack, at, n_blocks, next_try, n_nodes = s.descent.stack, start, 0, _N_BLOCKS, 0
     if at.n_stack < 0:
         stack[0, 0], stack[0, 1] = 0, 0
         at = Progress(1, 0, 0, 0, 0)
@@ -402,6 +406,10 @@ def search(s: Search, start: Progress, n_pairs: int, pause: int) -> tuple[int, i
                     at = Progress(n_stack, 0, 0, 0, 0)
                     continue
                 next_try = n_blocks + _N_MORE
+            n_nodes += 1
+            if n_nodes == _N_NODES and n_pairs == 0 and len(s.contacts.met) == 0 and n_stack <= STACK:
+                if is_decided_by_sample(s, n_stack + 1):
+                    return SETTLED, 1, at
             n_stack, low, high = expand_pair(s, i, j, n_stack)
             at = Progress(n_stack, i, j, low, high)
         if at.low != 0 or at.high != 0:

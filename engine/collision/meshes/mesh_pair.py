@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.collision.codes import KIND, N_COLUMNS, N_CONTACTS, UNSETTLED
 from engine.collision.meshes import dual_traversal as dual
-from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
+from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, STRENGTH
 from engine.collision.meshes.exact_body import ExactBody, classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
@@ -19,9 +19,27 @@ from engine.collision.meshes.pose_batch import ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Poses, Witness, Work
 from engine.compiling.jit import entry_of
+from engine.lanes.boxes import FRAME_ROWS
+from engine.lanes.faces import WORK_ROWS
+from engine.lanes.tracing import LANES
 from engine.types import UNDECIDED, Int8Array, IntArray
 
 _BLOCK = 64
+
+
+def new_descent() -> dual.Descent:
+    """Allocate the work space of one search."""
+    frames, work = np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((WORK_ROWS, LANES), np.float32)
+    return dual.Descent(
+        np.empty((dual.STACK_ROWS, 2), np.int32), frames, work, np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8)
+    )
+
+
+def new_contacts(room: int, n_faces: int = 0) -> dual.Contacts:
+    """Allocate room for pairs of faces in contact. n_faces: number of faces of both bodies together if the pairs with
+    only a corner in common are to be selected, 0 if all pairs are listed."""
+    n = room + (N_NAMED if n_faces else 0)
+    return dual.Contacts(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
 
 
 class _WorkSpace(threading.local):
@@ -29,8 +47,8 @@ class _WorkSpace(threading.local):
 
     def __init__(self) -> None:
         self.descent, self.contacts, self.rows = (
-            dual.new_descent(),
-            dual.new_contacts(dual.ROOM),
+            new_descent(),
+            new_contacts(dual.ROOM),
             np.empty((1, N_COLUMNS), np.int64),
         )
         self.row = self.rows[0]
@@ -69,7 +87,7 @@ def relate(
             return row, contacts
         work.budget.check()
         room = 16 * n
-        contacts = dual.new_contacts(room, len(first.faces) + len(second.faces))
+        contacts = new_contacts(room, len(first.faces) + len(second.faces))
 
 
 def search_goal(first: MeshBody, second: MeshBody, work: Work) -> int:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from engine import Surface, collide_triangles
-from engine.collision.meshes.dual_traversal import new_descent, place_bodies
+from engine.collision.meshes.dual_traversal import place_bodies
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
+from engine.collision.meshes.mesh_pair import new_descent
 from engine.collision.meshes.placement import PoseArrays
 from engine.compiling.jit import kernel
 from engine.lanes.faces import (

@@ -7,10 +7,10 @@ import pytest
 
 from engine import Polyhedron, Pose, Relation, Surface, collide
 from engine.collision.meshes.contact_kinds import common_corner
-from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_contacts
+from engine.collision.meshes.dual_traversal import SEEK_OVERLAP
 from engine.collision.meshes.exact_body import kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
-from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, relate
+from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, new_contacts, relate
 from engine.collision.meshes.triangle_triangle import Facet, with_pose
 from engine.collision.result import Work
 from engine.types import Point3
@@ -29,6 +29,21 @@ def test_a_common_corner_is_all() -> None:
             assert first[common // 3] == second[common % 3]
             assert kind_of_contact(tuple(map(tuple, first)), tuple(map(tuple, second))) == "vertex_vertex"
     assert n_told > 20
+
+
+def test_flat_faces_at_a_corner_are_parted_by_a_plane() -> None:
+    draw, poses, n_told, n_all = np.random.default_rng(2), np.zeros((1, 12)), 0, 0
+    for _ in range(1000):
+        points = draw.integers(-3, 4, (2, 2, 2)) @ draw.integers(-3, 4, (2, 3))
+        first, second = (np.vstack([[0, 0, 0], ends]).tolist() for ends in points)
+        t, u = (Facet(*(Point3(*map(float, p)) for p in corners)) for corners in (first, second))
+        common = common_corner(poses, t, u, with_pose(t), with_pose(u), 0.0)
+        if not (np.cross(*points[0]).any() and np.cross(*points[1]).any()):
+            continue
+        is_all = kind_of_contact(tuple(map(tuple, first)), tuple(map(tuple, second))) == "vertex_vertex"
+        n_told, n_all = n_told + (common >= 0), n_all + is_all
+        assert is_all or common < 0
+    assert n_told > 0.8 * n_all > 100
 
 
 def fan(n: int, height: float, width: float) -> Polyhedron:

@@ -9,10 +9,10 @@ import pytest
 
 from engine import Pose, Surface, collide
 from engine.collision.codes import N_COLUMNS, N_CONTACTS, RELATION, UNSETTLED
-from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_contacts, new_descent
+from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
-from engine.collision.meshes.mesh_pair import SPACE, MeshPair, relate, unless_identity
+from engine.collision.meshes.mesh_pair import SPACE, MeshPair, new_contacts, new_descent, relate, unless_identity
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import ONE_SETTLES, relate_poses

@@ -10,8 +10,9 @@ import pytest
 
 from engine import Aabb, Polyhedron, Pose, Surface
 from engine.collision.exact_images import image_point
-from engine.collision.meshes.dual_traversal import new_descent, place_bodies
+from engine.collision.meshes.dual_traversal import place_bodies
 from engine.collision.meshes.mesh_arrays import NO_AREA, lattice_shift, mesh_body_of
+from engine.collision.meshes.mesh_pair import new_descent
 from engine.collision.meshes.placement import NEVER_APART, place_pair, placed
 from engine.compiling.jit import kernel
 from engine.predicates.rational import dot

@@ -122,15 +122,40 @@ def test_plates_with_little_between_them(at: tuple[float, float]) -> None:
         assert collide(bent, plate, first_pose=move).relation == expected
 
 
-def test_faces_of_many_triangles_are_named_in_time() -> None:
-    """Two prisms with flush sides of 510 triangles each: of one face all triangles have its number."""
+def test_fans_that_overlap_are_decided_in_time() -> None:
+    first, second = fan(64_000, 1.0, 1), fan(64_000, 1.0, 2)
+    for at in ([0.3, 0.1, 0.2], [0.0, 0.0, 0.3]):  # all boxes around the apexes overlap
+        move = Pose(np.eye(3), at)
+        collide(fan(8), fan(8), second_pose=move)  # compiles
+        assert collide(first, second, second_pose=move, deadline=0.5).relation == Relation.OVERLAPPING
+        assert collide(second, first, second_pose=move, deadline=0.5).relation == Relation.OVERLAPPING
+
+
+def prism() -> Polyhedron:
+    """Return a prism of 512 sides, with corners at (1, 0) and (-1, 0)."""
     n, turns = 512, np.arange(512) * 2 * np.pi / 512
     ring = np.column_stack([np.cos(turns), np.sin(turns)])
+    ring[[0, 256]] = [1.0, 0.0], [-1.0, 0.0]
     faces = [list(range(n))[::-1], list(range(n, 2 * n))]
     faces += [[k, (k + 1) % n, n + (k + 1) % n] for k in range(n)] + [[k, n + (k + 1) % n, n + k] for k in range(n)]
-    prism = Polyhedron(np.concatenate([np.column_stack([ring, np.full(n, z)]) for z in (0.0, 1.0)]), faces)
-    collide(prism, prism, second_pose=Pose(np.eye(3), [0, 0.5, -1]))  # compiles
-    found = collide(prism, prism, second_pose=Pose(np.eye(3), [0, 1, -1]), deadline=1.0)  # it took three seconds
+    return Polyhedron(np.concatenate([np.column_stack([ring, np.full(n, z)]) for z in (0.0, 1.0)]), faces)
+
+
+def test_prisms_that_share_an_edge_are_named_in_time() -> None:
+    """510 triangles of each flat side meet in the ends of an edge; the sides lie in one plane."""
+    first, turn = prism(), Pose(np.diag([-1.0, -1.0, 1.0]), [2, 0, 0])
+    collide(first, first, second_pose=Pose(np.eye(3), [0, 0.5, -1]))  # compiles
+    found = collide(first, first, second_pose=turn, deadline=2.0)  # it took six seconds
+    assert found.relation == Relation.TOUCHING
+    assert found.witness is not None
+    assert (found.witness.kind, found.witness.first_face, found.witness.second_face) == ("edge_edge", 513, 513)
+
+
+def test_faces_of_many_triangles_are_named_in_time() -> None:
+    """Two prisms with flush sides of 510 triangles each: of one face all triangles have its number."""
+    first = prism()
+    collide(first, first, second_pose=Pose(np.eye(3), [0, 0.5, -1]))  # compiles
+    found = collide(first, first, second_pose=Pose(np.eye(3), [0, 1, -1]), deadline=1.0)  # it took three seconds
     assert found.relation == Relation.TOUCHING
     assert found.witness is not None
     assert (found.witness.kind, found.witness.first_face, found.witness.second_face) == ("face_face", 0, 1)
