@@ -9,7 +9,7 @@ import pytest
 
 from engine import Polyhedron, Pose, Surface, locate
 from engine.collision.meshes.contact_kinds import N_NAMED
-from engine.collision.meshes.exact_body import classify_exact
+from engine.collision.meshes.exact_body import classify_exact, kind_of_contact
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
     STATE_CROSSED,
@@ -21,7 +21,7 @@ from engine.collision.meshes.mesh_arrays import (
 from engine.collision.meshes.mesh_mesh import inspect_regions
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.meshes.parity import SIDE_UNKNOWN, inner_side, locate_vertices, states_of
-from engine.collision.meshes.triangle_triangle import APART, COMMON_AREA, COPLANAR
+from engine.collision.meshes.triangle_triangle import APART, COMMON_AREA, COPLANAR, CORNER
 from engine.collision.result import Work
 from engine.types import UNDECIDED
 from tests.reference.shapes import Solid, box, reversed_faces, tetrahedron, union_of
@@ -103,7 +103,7 @@ def test_flush_boxes(at: tuple[float, float, float], overlaps: bool, pose: Pose 
         assert found == overlaps
 
 
-# --- All contacts of a pair, the first of them by the caller's faces, coplanar ones first ---
+# --- All contacts of a pair, the first of them by the caller's faces, coplanar ones with more than a corner first ---
 
 
 @pytest.mark.parametrize("pose", [None, TURN])
@@ -119,6 +119,9 @@ def test_contacts_are_those_of_all_pairs_in_order(pose: Pose | None, at: tuple[f
     found = [(i, j) for i, j in pair.contacts.tolist()]
     assert sorted(found) == [key for key in every if kinds[key] != APART]
     ranks = {COMMON_AREA: 0, COPLANAR: 1}
+    for (i, j), kind in kinds.items():
+        if kind == COPLANAR and kind_of_contact(a.corners(i), b.corners(j)) == "vertex_vertex":
+            kinds[i, j] = CORNER
     keys = [(ranks.get(kinds[i, j], 2), a.mesh.faces[i], b.mesh.faces[j], i, j) for i, j in found]
     assert keys[:N_NAMED] == sorted(keys)[:N_NAMED]
 
