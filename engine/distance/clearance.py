@@ -105,8 +105,9 @@ def clearance(
     points given may be a little nearer or further. Poses are exact images, as for `collide`.
 
     Cost: boxes along the axes, balls and half-spaces some 4 us, convex bodies of up to 100 faces 6 (parallel ones apart
-    along axes too), small bodies of the plane 8. Others both trees, built once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers
-    for ties. Where sums of coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
+    along axes too), small bodies of the plane 8. Others both trees, built once per solid; a search of 30 to 220 us for
+    1,000 to 20,000 faces, then integers for ties. Where sums of coordinates may exceed 1e300 every pair of faces is
+    measured: right, and slow.
 
     For many poses of one pair use `clearance_poses`.
 
