@@ -3,6 +3,7 @@
     python -m benchmarks cores                       # threads alone: a minute or two
     python -m benchmarks cores --http --dask         # the service by 16 clients on loopback, worker processes of Dask
     python -m benchmarks cores --workers 1,16 --items 0.1 --only "points, mesh"
+    python -m benchmarks cores --simulate 16         # what 2, 4, 8 and 16 cores would give, from one thread's CPU time
 
 Wall time, the least of the rounds, in turns. "CPU" is the CPU time with the most workers over that with one.
 """
@@ -25,6 +26,7 @@ from benchmarks import load, machine
 from benchmarks.bodies import random_rotations
 from benchmarks.measure import clocked
 from benchmarks.polygon_pairs import small
+from benchmarks.simulated_cores import predict
 from benchmarks.wire import SPHERE, serving
 from benchmarks.workloads import bumpy_sphere, generator, mesh_of_size, points_in_box, star_polygon, star_rings
 from service.settings import Settings
@@ -43,6 +45,14 @@ def _bodies(seed: int) -> tuple[engine.Polyhedron, list[engine.Solid], list[engi
     moves = draw.uniform(-14.0, 14.0, (1000, 3))
     poses = [engine.Pose(turn, move) for turn, move in zip(random_rotations(draw, 1000), moves)]
     return mesh, [kinds[k % 3] for k in range(1000)], poses
+
+
+def _discs(n: int, seed: int) -> list[engine.Polygon]:
+    """Return regular polygons of 32 vertices, whose areas add up to that of the square where they lie."""
+    draw, angles = generator("cores/union", seed), np.arange(32) * (2 * np.pi / 32)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    middles = draw.uniform(0.0, np.sqrt(n), (n, 1, 2))
+    return [engine.Polygon([ring]) for ring in middles + draw.uniform(0.3, 0.8, (n, 1, 1)) * circle]
 
 
 def _workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
@@ -83,6 +93,8 @@ def _workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
     yield "quads, box", len(quads), lambda workers: engine.clip_polygons(quads, window, workers=workers)
     first, second = ([engine.Polygon(rings) for rings in each] for each in zip(*small("star", 10, n(1e5), seed)))
     yield "overlay_batch, stars of 10", len(first), lambda workers: engine.overlay_batch(first, second, workers=workers)
+    discs = _discs(n(2e4), seed)
+    yield "union of circles", len(discs), lambda workers: engine.union_all(discs, workers=workers)
 
 
 def _digest(answer: Any) -> str:
@@ -165,6 +177,21 @@ def _least(question: Callable[[], Any]) -> float:
     return min(clocked(question)[0] for _ in range(3))
 
 
+def _simulate(given: argparse.Namespace) -> int:
+    """Print predicted speed-ups, powers of two up to so many cores."""
+    counts = [2**k for k in range(1, given.simulate.bit_length())]
+    for name, n_items, question in _workloads(given.items, given.seed):
+        if given.only in name:
+            question(1), question(given.simulate)
+            row = predict(question, counts, ROUNDS)
+            ratios = "  ".join(f"{count}: {ratio:5.2f}" for count, ratio in row["speed_up"].items())
+            print(
+                f"{name:32} {n_items:9,}  {1e3 * row['seconds']:8.1f} ms  {ratios}  serial {row['serial']:.1%}",
+                flush=True,
+            )
+    return 0
+
+
 def main(words: list[str]) -> int:
     """Print the tables, and store them beside the other results of machines like this one."""
     parser = argparse.ArgumentParser(
@@ -177,8 +204,11 @@ def main(words: list[str]) -> int:
     parser.add_argument("--dask", action="store_true")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--dry", action="store_true", help="write no file")
+    parser.add_argument("--simulate", type=int, default=0, metavar="CORES", help="write no file, predict")
     given = parser.parse_args(words)
     engine.warm(processes=machine.cores())
+    if given.simulate:
+        return _simulate(given)
     counts: list[int | None] = [2**k for k in range(machine.cores().bit_length()) if 2**k <= machine.cores()]
     counts = [int(count) for count in given.workers.split(",")] if given.workers else [*counts, None]
     result: dict[str, Any] = {"facts": machine.facts(given.seed, machine.cores()), "threads": {}}
