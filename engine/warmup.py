@@ -271,6 +271,7 @@ def _warm_overlay_rest() -> None:
     overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=1e-14)  # distinguishable as doubles, but not certainly
     corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     union_all([Polygon([corner + np.array([x, y])]) for x in range(8) for y in range(8)])  # many, that share edges
+    union_all([Polygon([circle[::512] + 3.0 * k]) for k in range(160)])  # many, that share none
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")

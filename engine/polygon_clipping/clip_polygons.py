@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -14,14 +13,14 @@ import numpy.typing as npt
 
 from engine.compiling.jit import entry_of
 from engine.errors import TooComplexError
-from engine.polygon_clipping.contours import FEW, USUAL, Contours, as_contours, equal_rings
+from engine.polygon_clipping.contours import FEW, USUAL, Contours, as_contours, few_rings
 from engine.polygon_clipping.in_integers import clip_polygon
 from engine.polygon_clipping.planes import KernelScene, Plan, kernel_scene, plan_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import scaled_back
 from engine.running.budget import UNLIMITED, Budget, Cancel
-from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
+from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
 from engine.solids.checks import is_ready
@@ -189,13 +188,13 @@ def clip_polygons(
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
             return few
-    contours = as_contours(polygons, region.dimension) if plan is not None and is_free else None
+    contours = as_contours(polygons, region.dimension, workers) if plan is not None and is_free else None
     if plan is not None and contours is not None and len(contours.vertices) <= FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:
         with Budget(deadline, cancel) as budget:
             plan = plan_of(region, budget.check)
-            contours = as_contours(polygons, region.dimension) if contours is None else contours
+            contours = as_contours(polygons, region.dimension, workers, budget) if contours is None else contours
             clipped, n_beyond, n_rational = _clip(contours, plan, budget, workers, progress)
     if not report:
         return clipped
@@ -210,12 +209,8 @@ def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> Clipp
     flat = polygons.reshape(-1)
     if not (0 < len(flat) <= FEW and USUAL[0] < np.vdot(flat, flat) < USUAL[1]):
         return None
-    result = _clip_few(flat, plan.tables, *_few_rings(n, size), UNLIMITED)
+    result = _clip_few(flat, plan.tables, *few_rings(n, size), UNLIMITED)
     return None if result is None else result[0]
-
-
-_few_rings = functools.lru_cache(64)(equal_rings)
-"""`equal_rings`, cached for arrays that are clipped at once."""
 
 
 class Batch(NamedTuple):
@@ -305,8 +300,7 @@ def _clip(
         parts[first] = clip_chunk(batch, first, last, budget)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
-    left = join_columns([(np.zeros((0, d)),), *((parts[first],) for first in sorted(parts))], budget, workers)[0]
-    clipped = _assemble(left, sizes, polygon_offsets, status, may_have_bridges)
+    clipped = _assemble(parts, sizes, polygon_offsets, (status, may_have_bridges), d, budget, workers)
     return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))
 
 
@@ -333,18 +327,42 @@ def _clip_few(
     if n == n_rings and all(each):
         ends, contours = np.array([0, *accumulate(each)], np.int64), np.zeros(n, np.int64)
         return ClippedPolygons(left, ends, polygon_offsets, contours, status, bridges), n_beyond
-    return _assemble(left, sizes, polygon_offsets, status, bridges), n_beyond
+    return _assemble({0: left}, sizes, polygon_offsets, (status, bridges), d, budget, 1), n_beyond
 
 
 def _assemble(
-    vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
-) -> ClippedPolygons:
-    """Return the clipped polygons. vertices (n, dim): ring after ring; sizes: number of vertices left of each ring, 0
-    for rings that vanished; polygon_offsets: of polygons into all given rings."""
-    left = np.flatnonzero(sizes)
-    if len(polygon_offsets) == len(sizes) + 1:  # a ring each
-        ends, contours = summed(sizes > 0), np.zeros(len(left), np.int64)
-        return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
-    owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
-    contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
-    return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
+    parts: dict[int, FloatArray], sizes: IntArray, polygon_offsets: IntArray, flags: tuple[Int8Array, BoolArray],
+    dimension: int, budget: Budget, workers: int | None,
+) -> ClippedPolygons:  # fmt: skip
+    """Return the clipped polygons. parts: by number of their first polygon, the vertices (n, dim) left of several, ring
+    after ring; sizes: number of vertices left of each ring, 0 for rings that vanished; polygon_offsets: of polygons
+    into all given rings; flags: `status` and `may_have_bridges`."""
+    firsts = sorted(parts)
+    ends = [*firsts[1:], len(polygon_offsets) - 1]
+    starts = summed([len(parts[first]) for first in firsts])
+    parted = [sizes[polygon_offsets[first] : polygon_offsets[end]] for first, end in zip(firsts, ends)]
+    rings = summed([int(np.count_nonzero(some)) for some in parted])
+    vertices = parts[0] if len(firsts) == 1 else np.empty((starts[-1], dimension))
+    contours, ring_offsets = np.zeros(rings[-1], np.int64), np.zeros(rings[-1] + 1, np.int64)
+    offsets = np.zeros(len(polygon_offsets), np.int64)
+    is_single = len(polygon_offsets) == len(sizes) + 1  # a ring each
+
+    def fill(begin: int, stop: int) -> None:
+        for k in range(begin, stop):
+            budget.check()
+            own, ring, end, is_left = polygon_offsets[firsts[k] : ends[k] + 1], rings[k], rings[k + 1], parted[k] > 0
+            ends_of = ring_offsets[ring + 1 : end + 1]
+            np.add(np.cumsum(parted[k][is_left], out=ends_of), starts[k], out=ends_of)
+            before = ring + np.cumsum(is_left)
+            offsets[firsts[k] + 1 : ends[k] + 1] = before if is_single else before[own[1:] - own[0] - 1]
+            if not is_single:
+                number = np.arange(len(is_left)) - np.repeat(own[:-1] - own[0], np.diff(own))
+                contours[ring:end] = number[is_left]
+            if len(firsts) > 1:
+                vertices[starts[k] : starts[k + 1]] = parts[firsts[k]]
+
+    if len(firsts) == 1:
+        fill(0, 1)
+    else:
+        run_chunks(fill, len(firsts), budget=budget, workers=workers, first_chunk=1)
+    return ClippedPolygons(vertices, ring_offsets, offsets, contours, *flags)

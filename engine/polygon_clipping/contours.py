@@ -1,7 +1,8 @@
-"""What `clip_polygons` takes, as flat arrays: the rings of all polygons of a call."""
+"""The rings of all polygons of a call as flat arrays: arrays, polygons, lists of rings, or GeoJSON."""
 
 from __future__ import annotations
 
+import functools
 from math import isfinite, sqrt
 from typing import Any, Final, NamedTuple
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from engine.errors import EmptyGeometryError, InvalidArrayError
 from engine.predicates.rational import largest_of
-from engine.running.budget import polled
+from engine.running.budget import UNLIMITED, Budget, polled
+from engine.running.parallel import run_chunks
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
 from engine.solids.geometries import geometry_of
 from engine.solids.polygon import Polygon
@@ -24,6 +26,22 @@ USUAL: Final = (2.0**-100, 2.0**120)
 `numpy.vdot` does not warn on overflow, as `dot` does."""
 
 
+def equal_rings(n: int, size: int, workers: int | None = 1, budget: Budget = UNLIMITED) -> tuple[IntArray, IntArray]:
+    """Return ring offsets and polygon offsets, read-only, of n polygons of one ring of `size` vertices each."""
+    offsets, numbers = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
+
+    def fill(first: int, last: int) -> None:
+        numbers[first:last] = np.arange(first, last)
+        np.multiply(numbers[first:last], size, out=offsets[first:last])
+
+    run_chunks(fill, n + 1, budget=budget, workers=workers, first_chunk=1 << 16)
+    return read_only(offsets), read_only(numbers)
+
+
+few_rings = functools.lru_cache(64)(equal_rings)
+"""`equal_rings`, cached for arrays that are clipped at once."""
+
+
 class Contours(NamedTuple):
     """The rings of all polygons of a call."""
 
@@ -36,13 +54,7 @@ class Contours(NamedTuple):
     """Largest magnitude of a coordinate; or another number, if both need no scaling."""
 
 
-def equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
-    """Return ring offsets and polygon offsets, read-only, of n polygons of one ring of `size` vertices each."""
-    numbers = np.arange(n + 1)
-    return read_only(size * numbers), read_only(numbers)
-
-
-def as_contours(polygons: Any, dimension: int) -> Contours:
+def as_contours(polygons: Any, dimension: int, workers: int | None = 1, budget: Budget = UNLIMITED) -> Contours:
     """Return the rings of all polygons of a call: an array (one ring a polygon), a list of polygons or of lists of
     rings, or GeoJSON. An array is not copied.
 
@@ -55,9 +67,9 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
         flat = array.reshape(-1)
-        if not isfinite(largest := _size_of(flat)):
+        if not isfinite(largest := _size_of(flat, workers, budget)):
             check_finite(array, ("polygons",))
-        return Contours(dimension, flat, *equal_rings(n, size), largest)
+        return Contours(dimension, flat, *equal_rings(n, size, workers, budget), largest)
     if not isinstance(polygons, (list, tuple)):
         if geometry_of(polygons) is None:
             raise InvalidArrayError(
@@ -66,8 +78,8 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
             )
         polygons = as_solids(polygons, "polygons")
     if len(polygons) == 1 and type(alone := polygons[0]) is Polygon and alone.dimension == dimension:
-        flat, offsets = alone.vertices.reshape(-1), alone.ring_offsets
-        return Contours(dimension, flat, offsets, read_only(np.array([0, len(offsets) - 1])), _size_of(flat))
+        flat, offsets, counted = alone.vertices.reshape(-1), alone.ring_offsets, np.array([0, alone.n_rings])
+        return Contours(dimension, flat, offsets, read_only(counted), _size_of(flat, workers, budget))
     rings: list[FloatArray] = []
     counts: list[int] = []
     for i, polygon in enumerate(polled(polygons)):
@@ -92,10 +104,18 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         rings += own
         counts.append(len(own))
     vertices = np.concatenate(rings).reshape(-1) if rings else np.zeros(0)
-    return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), _size_of(vertices))
+    size = _size_of(vertices, workers, budget)
+    return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), size)
 
 
-def _size_of(vertices: FloatArray) -> float:
-    """Return `Contours.size`."""
+def _size_of(vertices: FloatArray, workers: int | None, budget: Budget) -> float:
+    """Return `Contours.size`; not finite if a number is not."""
     square = np.vdot(vertices, vertices) if len(vertices) <= FEW else 0.0
-    return sqrt(square) if USUAL[0] < square < USUAL[1] else largest_of(vertices)
+    if USUAL[0] < square < USUAL[1]:
+        return sqrt(square)
+    sizes = [0.0]
+    run_chunks(
+        lambda first, last: sizes.append(largest_of(vertices[first:last])), len(vertices), budget=budget,
+        workers=workers, first_chunk=1 << 18,
+    )  # fmt: skip
+    return float(np.max(sizes))

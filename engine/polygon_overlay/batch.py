@@ -199,7 +199,7 @@ def twice_areas(made: OverlayBatch) -> FloatArray:
 def _polygons_in(solids: Any, name: str) -> Sequence[Solid]:
     """Return polygons as a tuple, or unchanged if they are a selection of arrays; other shapes are read
     (`shapes.as_solid`). name: of the argument, for errors."""
-    return solids if isinstance(solids, PolygonSelection) else tuple(polygons_in(solids, name))
+    return solids if isinstance(solids, PolygonSelection) else polygons_in(solids, name)
 
 
 def _n_vertices(solids: Sequence[Solid]) -> int:
@@ -211,13 +211,11 @@ def _n_vertices(solids: Sequence[Solid]) -> int:
     )
 
 
-def _polygon_arrays(solids: Sequence[Solid]) -> PolygonArrays:
-    """Return polygons as flat arrays."""
-    return (
-        solids.arrays()
-        if isinstance(solids, PolygonSelection)
-        else polygon_arrays_of(cast("Sequence[Polygon]", solids))
-    )
+def _polygon_arrays(solids: Sequence[Solid], first: int = 0, last: int | None = None) -> PolygonArrays:
+    """Return polygons first .. last - 1 as flat arrays."""
+    if isinstance(solids, PolygonSelection):
+        return solids[first:last].arrays()
+    return polygon_arrays_of(cast("Sequence[Polygon]", solids), first, last)
 
 
 def overlay_batch(
@@ -286,10 +284,9 @@ def overlay_batch(
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
-            # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
-            parts[start] = run_kernel(
-                _polygon_arrays(subjects[start:stop]), _polygon_arrays(clips[start:stop]), selected, budget
-            )
+            # Gathered here, chunk by chunk: by all threads, and what was written is near.
+            both = _polygon_arrays(subjects, start, stop), _polygon_arrays(clips, start, stop)
+            parts[start] = run_kernel(*both, selected, budget)
 
         n_few = max(1, _n_vertices(subjects[:_FIRST_CHUNK]) + _n_vertices(clips[:_FIRST_CHUNK]))
         first_chunk = _FIRST_CHUNK * min(64, max(1, _FIRST_VERTICES // n_few))

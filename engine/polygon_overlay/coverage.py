@@ -29,6 +29,8 @@ _LEAST: Final = 256
 """Fewest edges for which to look for shared ones."""
 _MOST: Final = 1 << 12
 """Most edges of one polygon: of larger ones few are shared."""
+_MANY: Final = 1 << 16
+"""Number of edges from which those of a sample have a small table."""
 _SAMPLE: Final = 31
 """Bits that are 0 in the hashes of sampled edges: one of 32."""
 
@@ -42,8 +44,11 @@ def union_of_coverage(polygons: PolygonArrays, budget: Budget, is_claimed: bool 
     places, starts = vertices.view(np.int64), np.arange(n, dtype=np.int32)
     ends = next_in_rings(polygons.ring_offsets).astype(np.int32)
     table, state = np.empty(2 << (n - 1).bit_length(), np.int32), np.zeros(n, np.int8)
-    cancel = entry_of(cancel_edges)
-    n_seen, n_cancelled = cancel(places, starts, ends, _SAMPLE, table, state, budget.flag)
+    cancel, few = entry_of(cancel_edges), table if n < _MANY else table[: len(table) >> 4]
+    n_seen, n_cancelled = cancel(places, starts, ends, _SAMPLE, few, state, budget.flag)
+    if n_cancelled < 0 and few is not table:  # of whole numbers the hashes are such that more are in the sample
+        state[:] = 0
+        n_seen, n_cancelled = cancel(places, starts, ends, _SAMPLE, table, state, budget.flag)
     if 2 * n_cancelled < n_seen and not is_claimed:
         return None
     following, sides = np.empty(n, np.int64), np.zeros(n, np.int8)

@@ -42,6 +42,7 @@ from engine.polygon_overlay.run import (
     overlay_few,
     rebuild_from_rounded_rings,
 )
+from engine.polygon_overlay.stripes import union_by_stripes
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options, is_unlimited
 from engine.solids.accepted import SolidLike, SolidsLike
@@ -172,13 +173,15 @@ def check_operation(operation: str) -> None:
         )
 
 
-def polygons_in(solids: SolidsLike, name: str) -> Sequence[Solid]:
-    """Return a sequence of polygons, other shapes read (`as_solids`). name: of the argument, for errors. Raises
+def polygons_in(solids: SolidsLike, name: str) -> tuple[Solid, ...]:
+    """Return polygons as a tuple, other shapes read (`as_solids`). name: of the argument, for errors. Raises
     UnsupportedSolidError for what is no polygon, with its index."""
-    read = as_solids(solids, name)
-    if set(map(type, read)) - {Polygon}:
-        for k, each in enumerate(read):
-            rings_of(each, name, k)
+    given = tuple(solids) if isinstance(solids, (list, tuple)) else ()
+    if given and set(map(type, given)) == {Polygon}:
+        return given
+    read = tuple(as_solids(given or solids, name))
+    for k, each in enumerate(read):
+        rings_of(each, name, k)
     return read
 
 
@@ -197,17 +200,18 @@ def rings_of(solid: object, *where: str | int) -> RingArrays:
 
 def overlay_rings(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
-    grid: float | None = None,
+    grid: float | None = None, workers: int | None = 1,
 ) -> tuple[Overlay, int, int]:  # fmt: skip
     """Return the overlay of checked rings (either side may be empty), the number of edge pairs decided exactly, and of
     those decided in rationals. nesting: of the subject's rings, for a rule other than even-odd; then there is no clip,
-    and the operation is "union". grid: spacing to which the result is snapped."""
+    and the operation is "union". grid: spacing to which the result is snapped. workers: of large unions."""
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
     if units is not None:
         first = RingArrays(units.to_units(subject.vertices), subject.offsets)
         second = RingArrays(units.to_units(clip.vertices), clip.offsets)
-    compiled = overlay_compiled(first, second, operation, budget, nesting, units)
+    made = union_by_stripes(first, nesting, workers, budget) if nesting.rule == Rule.ANY else None
+    compiled = overlay_compiled(first, second, operation, budget, nesting, units, made)
     if compiled is not None:
         result, n_exact, n_rational = *compiled, 0
     else:
@@ -266,7 +270,9 @@ def union_all(
         None at all, or some without rings, unite to nothing.
     grid : float, optional
         As for `overlay`.
-    workers, deadline, cancel, progress, report
+    workers : int, optional
+        As for `locate`; one thread works on fewer than 400,000 vertices.
+    deadline, cancel, progress, report
         As for `overlay`.
 
     Returns
@@ -303,7 +309,7 @@ def union_all(
     """
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
-        result, accuracy = _arrange_all(polygons, Rule.ANY, budget, grid)
+        result, accuracy = _arrange_all(polygons, Rule.ANY, budget, grid, workers)
     if progress is not None:
         progress(1)
     return (result, accuracy) if report else result
@@ -368,7 +374,7 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
 
 
 def _arrange_all(
-    polygons: SolidsLike, rule: Rule, budget: Budget, grid: float | None = None
+    polygons: SolidsLike, rule: Rule, budget: Budget, grid: float | None = None, workers: int | None = 1
 ) -> tuple[Overlay, Accuracy]:
     """Return the overlay of the rings of all polygons by a fill rule, each polygon a source of its own, and the
     accuracy report. grid: spacing to which the result is snapped."""
@@ -383,6 +389,6 @@ def _arrange_all(
         n_rings = np.diff(flat.polygon_offsets)  # polygons without rings have no number: a ring's is at least its own
         nesting = Nesting(np.repeat(np.cumsum(n_rings > 0) - 1, n_rings), np.zeros(0), int(rule))
         rings = RingArrays(*flat[:2])
-        result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)
+        result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid, workers)
     object.__setattr__(result, "_starts", flat.ring_offsets[flat.polygon_offsets[1:-1]])
     return result, accuracy_of(ulps_moved(result), n, n_exact, n_rational)

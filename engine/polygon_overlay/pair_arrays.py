@@ -10,7 +10,8 @@ import numpy as np
 from engine.compiling.jit import entry_of
 from engine.errors import RingTooShortError
 from engine.polygon_overlay.compiled.kernel import PairStatus
-from engine.polygon_overlay.compiled.loading import largest_counts
+from engine.polygon_overlay.compiled.loading import boxes_of_runs, largest_counts
+from engine.polygon_overlay.compiled.polygon_fields import LAYOUT, copy_rings, count_rings
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import join_columns
@@ -193,10 +194,9 @@ class PolygonArrays(NamedTuple):
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the low and high corners (n, 2) of the boxes of polygons `numbers`, ascending and none empty."""
-        starts = self.ring_offsets[self.polygon_offsets[numbers]]
-        if not len(starts):
-            return np.zeros((0, 2)), np.zeros((0, 2))
-        return np.minimum.reduceat(self.vertices, starts), np.maximum.reduceat(self.vertices, starts)
+        low, high = np.empty((len(numbers), 2)), np.empty((len(numbers), 2))
+        entry_of(boxes_of_runs)(self.vertices, self.ring_offsets[self.polygon_offsets[numbers]], low, high)
+        return low, high
 
 
 def arrays_of(coordinates: object, ring_offsets: object, polygon_offsets: object) -> PolygonArrays:
@@ -221,18 +221,23 @@ def concatenate_polygons(parts: Sequence[PolygonArrays]) -> PolygonArrays:
     )
 
 
-def polygon_arrays_of(polygons: Sequence[Polygon]) -> PolygonArrays:
-    """Return polygons as flat arrays, joined as bytes: numpy takes three times as long to concatenate small ones."""
-    if len(polygons) == 1:
-        return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
-    vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
-    offsets = np.frombuffer(b"".join(cast("list[bytes]", [each.ring_offsets for each in polygons])), np.int64)
-    if len(offsets) == 2 * len(polygons) and not offsets[::2].any():  # one ring each: a small batch waits for this
-        return PolygonArrays(vertices.reshape(-1, 2), summed(offsets[1::2]), read_only(np.arange(len(polygons) + 1)))
-    starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
-    ends = np.append(starts[1:], len(offsets)) - 1
-    sizes = np.delete(offsets[1:] - offsets[:-1], ends[:-1])
-    return PolygonArrays(vertices.reshape(-1, 2), summed(sizes), summed(ends - starts))
+def polygon_arrays_of(polygons: Sequence[Polygon], first: int = 0, last: int | None = None) -> PolygonArrays:
+    """Return polygons first .. last - 1, at least one, by default to the end, as flat arrays."""
+    every = tuple(polygons)  # another thread may change a list
+    n = (len(every) if last is None else min(last, len(every))) - first
+    if n == 1:
+        only = every[first]
+        return PolygonArrays(only.vertices, only.ring_offsets, one_polygon(only.n_rings))
+    if LAYOUT is None:
+        some = every[first : first + n]
+        sizes = [np.diff(each.ring_offsets) for each in some]
+        vertices = read_only(np.concatenate([each.vertices for each in some]))
+        return PolygonArrays(vertices, summed(np.concatenate(sizes)), summed([len(each) for each in sizes]))
+    offsets = np.empty(n + 1, np.int64)
+    vertices = np.empty((entry_of(count_rings)(id(every), LAYOUT, first, offsets), 2))
+    rings = np.empty(offsets[-1] + 1, np.int64)
+    entry_of(copy_rings)(id(every), LAYOUT, first, offsets, vertices, rings)
+    return PolygonArrays(read_only(vertices), read_only(rings), read_only(offsets))
 
 
 class PolygonSelection(Sequence[Polygon]):

@@ -159,12 +159,12 @@ def _run_pair(
 
 def overlay_compiled(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
-    grid: Grid | None = None,
+    grid: Grid | None = None, made: PairResults | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
     """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN. grid:
-    coordinates are in its units, and the result is snapped to it. A scene outside the kernel's range is scaled into it
-    by a power of two, if that is exact."""
-    pair, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
+    coordinates are in its units, and the result is snapped to it. made: the kernel's result, if known. A scene
+    outside the kernel's range is scaled into it by a power of two, if that is exact."""
+    pair, exponent = made or _run_pair(subject, clip, operation, budget, nesting), 0
     if pair.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0 or grid is not None:

@@ -176,6 +176,7 @@ def run_chunks(
     workers: int | None = None,
     progress: Progress | None = None,
     in_order: bool = False,
+    pace: float = 0.0,
 ) -> None:
     """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
 
@@ -185,12 +186,13 @@ def run_chunks(
     millisecond. Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
 
     workers: threads at once; None for one per core, 1 for the calling thread only. in_order: a task continues what the
-    range before began, so that ranges stay short where there are few threads.
+    range before began, so that ranges stay short where there are few threads. pace: seconds an item takes, where that
+    is known and items are few and long: none is timed first.
     Raises: what `task` raises (the earliest range first), `DeadlineExceededError`, `CancelledError`.
     """
     check_options(workers, progress)
     n_workers = default_workers() if workers is None else workers
-    done, chunk, pace, is_timed = 0, max(1, first_chunk), 0.0, False  # pace: seconds an item
+    done, chunk, is_timed = 0, max(1, first_chunk), pace > 0.0
     while done < n_items:
         budget.check()
         rest = (n_items - done) * pace
@@ -390,3 +392,17 @@ def join_columns(
 
     run_chunks(copy, len(parts), budget=budget, first_chunk=1, workers=workers)
     return joined
+
+
+def take_rows(arrays: Sequence[Any], rows: Any, budget: Budget, workers: int | None) -> list[Any]:
+    """Return the rows of arrays, all of one length, at places ``rows``; many by several threads, as `join_columns`."""
+    if not len(rows) or sum(len(rows) * array[:1].nbytes for array in arrays) < _FEW_BYTES:
+        return [array[rows] for array in arrays]
+    taken = [np.empty((len(rows), *array.shape[1:]), array.dtype) for array in arrays]
+
+    def take(first: int, last: int) -> None:
+        for array, into in zip(arrays, taken):
+            np.take(array, rows[first:last], axis=0, out=into[first:last], mode="clip")  # others copy once more
+
+    run_chunks(take, len(rows), budget=budget, first_chunk=1 << 14, workers=workers)
+    return taken

@@ -228,16 +228,17 @@ def _arrange_chains(
 
 
 @merged
-def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tuple[float, bool]:
+def _round(w: Workspace, n: int, arranged: _Arrangement, is_part: bool, stop: FlagArray) -> tuple[float, bool]:
     """Round the points of the rings into ``w.rounded``; return the largest displacement, or LOST, and whether the
-    rounded rings are proven valid. n: number of input vertices."""
+    rounded rings are proven valid. n: number of input vertices; is_part: the rule is PART."""
     rings, rounded, n_boundary, n_points = w.rings, w.rounded, arranged.n_boundary, arranged.n_points
     farthest = round_points(w.given.edges, w.events, rings.point, n, arranged.n_crossings, n_points, rounded, stop)
     if farthest <= 0.0:
-        return farthest, farthest == 0.0
+        return farthest, farthest == 0.0 and (arranged.is_clear or not is_part)
     is_valid = not has_straight_point(rings, n_boundary, rounded, stop) and (
         arranged.is_clear
-        or certify(rings, n_boundary, n_points, rounded, w.tree, w.chains.at, w.stars.node_of, stop)
+        or (not is_part
+        and certify(rings, n_boundary, n_points, rounded, w.tree, w.chains.at, w.stars.node_of, stop))
     )  # fmt: skip
     return farthest, is_valid
 
@@ -329,7 +330,7 @@ def overlay_pairs(
             return _progress(pair, NEEDS_CONTACTS, filled, 0)
         if w.given.edges.doubts[0] != 0:
             continue
-        moved_by, is_valid = _round(w, loaded.n, arranged, stop)
+        moved_by, is_valid = _round(w, loaded.n, arranged, nesting.rule == Rule.PART, stop)
         if moved_by == LOST:
             continue
         n_boundary, m = arranged.n_boundary, arranged.n_points

@@ -216,3 +216,13 @@ def largest_counts(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[i
         first, end = polygon_offsets[k], polygon_offsets[k + 1]
         n_vertices, n_rings = max(n_vertices, ring_offsets[end] - ring_offsets[first]), max(n_rings, end - first)
     return n_vertices, n_rings
+
+
+@kernel
+def boxes_of_runs(vertices: FloatArray, starts: IntArray, low: FloatArray, high: FloatArray) -> None:
+    """Fill low, high (n, 2) with the corners of the box of the vertices from each start to the next, or to the end."""
+    n = starts.shape[0]
+    for k in range(n):
+        low[k, 0], high[k, 0], low[k, 1], high[k, 1] = box_of(
+            vertices, starts[k], starts[k + 1] if k + 1 < n else vertices.shape[0]
+        )

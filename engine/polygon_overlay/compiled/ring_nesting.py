@@ -51,6 +51,8 @@ class Rule(IntEnum):
     """By a table over the labels of two polygons (bit 0: in the subject, bit 1: in the clip)."""
     FIRST_ALONE = 7
     """Inside source 0 and no other."""
+    PART = 8
+    """As ANY, of some of the sources: rounded rings count as valid only if all edges are apart by the margin."""
 
 
 class Nesting(NamedTuple):
@@ -59,7 +61,7 @@ class Nesting(NamedTuple):
     | rule | shells (n_rings,) int64 | sizes (n_rings,) float64 |
     | --- | --- | --- |
     | AGAIN | the number of its shell, its own for a shell | the size of its shell |
-    | ANY, FIRST_ALONE | the number of its source, at most its own number | unused |
+    | ANY, FIRST_ALONE, PART | the number of its source, at most its own number | unused |
     | winding numbers | unused values | unused |
     | PAIR | empty | empty |
     """

@@ -24,10 +24,10 @@ from engine.polygon_clipping.clip_polygons import (
     Batch,
     ClippedPolygons,
     PolygonStatus,
-    as_contours,
     clip_chunk,
     clip_polygons,
 )
+from engine.polygon_clipping.contours import as_contours
 from engine.polygon_clipping.planes import kernel_scene, plan_of
 from engine.running.budget import Budget, Cancel
 from engine.solids.base import Solid

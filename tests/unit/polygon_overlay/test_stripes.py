@@ -1,0 +1,111 @@
+"""Unions by stripes have the bytes of unions made at once, whatever lies across the sides; else there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import engine
+from engine.polygon_overlay import overlay as overlays
+from engine.polygon_overlay import stripes
+from engine.polygon_overlay.stripes import union_by_stripes
+from engine.types import FloatArray, read_only
+
+Maker = Callable[[np.random.Generator], list[engine.Polygon]]
+
+
+@pytest.fixture(autouse=True)
+def _small_stripes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stripes, "_LEAST", 60)
+    monkeypatch.setattr(stripes, "_LEAST_IN_ALL", 0)
+    monkeypatch.setattr(stripes, "_REPEATED", 4.0)
+
+
+def _star(rng: np.random.Generator, n: int, size: float, at: FloatArray) -> FloatArray:
+    angles = (np.sort(rng.random(n)) + np.arange(n)) * (np.pi / n)
+    return at + size * rng.uniform(0.3, 1.0, (n, 1)) * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+
+
+def _stars(rng: np.random.Generator) -> list[engine.Polygon]:
+    return [engine.Polygon([_star(rng, 12, 1.0, at)[:: rng.choice([1, -1])]]) for at in rng.uniform(0, 14, (150, 2))]
+
+
+def _long(rng: np.random.Generator) -> list[engine.Polygon]:
+    """Edges over many stripes, in both directions, among small ones."""
+    bars = [
+        engine.Polygon([[(x, y), (20 - x, y + slope), (20.5 - x, y + slope + 0.3), (x + 0.1, y + 0.2)]])
+        for x, y, slope in rng.uniform(0, 12, (9, 3)) * (0.2, 1, 0.1)
+    ]
+    return [*bars, *_stars(rng)[:70]]
+
+
+def _holes(rng: np.random.Generator) -> list[engine.Polygon]:
+    """Islands in holes: one ring around everything, whose edges lie far from most stripes."""
+    frame = engine.Polygon([[(-9, -9), (30, -8), (29, 31), (-8, 30)], [(-5, -5), (-4, 25), (26, 26), (25, -4)]])
+    sheet = engine.Polygon([[(40, -9), (80, -8), (79, 31), (42, 30)], *(
+        _star(rng, 8, 1.5, np.array([x, y])) for x in range(44, 78, 4) for y in range(-4, 28, 4)
+    )])  # fmt: skip
+    return [frame, sheet, *_stars(rng)]
+
+
+def _tee(_: np.random.Generator) -> list[engine.Polygon]:
+    """One region whose parts at the left of an abscissa that is a side meet its right only across that."""
+    grid = [engine.Polygon([[(x + 0.1, 50.3), (x + 0.7, 50.1), (x + 0.4, 50.9)]]) for x in range(60)]
+    left = engine.Polygon([[(0, 0.25), (30, 0), (30.0, 10.0), (0.5, 10.5)]])
+    return [left, engine.Polygon([[(29.5, 3), (60, 3.25), (60.5, 7), (29.25, 7.5)]]), *grid]
+
+
+@pytest.fixture
+def by_stripes(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Whether each union so far was made by stripes."""
+    seen: list[bool] = []
+
+    def noted(*arguments: object) -> object:
+        made = union_by_stripes(*arguments)  # type: ignore[arg-type]
+        seen.append(made is not None)
+        return made
+
+    monkeypatch.setattr(overlays, "union_by_stripes", noted)
+    return seen
+
+
+@pytest.mark.parametrize("make", [_stars, _long, _holes, _tee])
+@pytest.mark.parametrize("turn", [False, True], ids=["along x", "along y"])
+def test_the_bytes_are_those_of_the_whole(
+    make: Maker, turn: bool, by_stripes: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for case in range(12):
+        polygons = make(np.random.default_rng(case))
+        if turn:
+            polygons = [
+                engine.Polygon.of_arrays(read_only(each.vertices[:, ::-1].copy()), each.ring_offsets)
+                for each in polygons
+            ]
+        made = [engine.union_all(polygons, workers=workers) for workers in (1, 3)]
+        assert all(by_stripes[-2:])
+        with monkeypatch.context() as whole:
+            whole.setattr(overlays, "union_by_stripes", lambda *_: None)
+            expected = engine.union_all(polygons)
+        for each in made:
+            for name in ("vertices", "ring_offsets", "piece_offsets"):
+                assert getattr(each, name).tobytes() == getattr(expected, name).tobytes()
+            assert each.exact.sources.tobytes() == expected.exact.sources.tobytes()  # type: ignore[union-attr]
+            assert each.largest_displacement >= 0.999 * expected.largest_displacement  # to some digits
+            assert each.largest_displacement == made[0].largest_displacement
+            assert each.area == expected.area
+
+
+def test_what_touches_is_united_at_once(by_stripes: list[bool]) -> None:
+    """Corners on edges, shared edges, squares that meet in a corner: no margin is left."""
+    rng = np.random.default_rng(0)
+    squares = [
+        engine.Polygon([[(x, y), (x + 2, y), (x + 2, y + 2), (x, y + 2)]])
+        for x, y in rng.integers(0, 40, (300, 2)).tolist()
+    ]
+    first, second = (engine.union_all(squares, workers=workers) for workers in (1, 3))
+    assert by_stripes == [False, False]
+    covered = {(x + i, y + j) for each in squares for x, y in [each.vertices[0]] for i in (0, 1) for j in (0, 1)}
+    assert first.area == len(covered)
+    assert first.vertices.tobytes() == second.vertices.tobytes()
