@@ -188,7 +188,8 @@ def clip_polygons(
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
             return few
-    contours = as_contours(polygons, region.dimension, workers) if plan is not None and is_free else None
+    is_small = not isinstance(polygons, np.ndarray) or polygons.size <= FEW  # else several threads read, in a budget
+    contours = as_contours(polygons, region.dimension) if plan is not None and is_free and is_small else None
     if plan is not None and contours is not None and len(contours.vertices) <= FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:

@@ -14,7 +14,7 @@ from engine.polygon_overlay.compiled.loading import boxes_of_runs, largest_count
 from engine.polygon_overlay.compiled.polygon_fields import LAYOUT, copy_rings, count_rings
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.running.budget import UNLIMITED, Budget
-from engine.running.parallel import join_columns
+from engine.running.joining import join_columns, join_sizes
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted, summed
 from engine.types import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
@@ -84,11 +84,9 @@ def concatenate_pairs(parts: list[PairResults], budget: Budget = UNLIMITED, work
     """Return the pairs of all parts, at least one, without evidence."""
     if len(parts) == 1:
         return parts[0]._replace(evidence=NO_EVIDENCE)
-    rows = [(*part[:5], *(each[1:] - each[:-1] for each in part[5:7])) for part in parts]
-    joined: Any = join_columns(rows, budget, workers)
-    outcomes: list[Any] = joined[:5]
-    ring_offsets, piece_offsets = summed(joined[5]), summed(joined[6])
-    return PairResults._make([*outcomes, ring_offsets, piece_offsets, NO_EVIDENCE])
+    outcomes: Any = join_columns([part[:5] for part in parts], budget, workers)
+    rings, pieces = (read_only(join_sizes([np.diff(part[k]) for part in parts], budget, workers)) for k in (5, 6))
+    return PairResults._make([*outcomes, rings, pieces, NO_EVIDENCE])
 
 
 def concatenate_parts(parts: Sequence[Sequence[Any]]) -> list[Any]:

@@ -28,7 +28,8 @@ from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays, one_p
 from engine.polygon_overlay.run import SELECTED_ARRAYS, run_kernel
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.running.budget import Budget
-from engine.running.parallel import join_columns, run_chunks, take_rows
+from engine.running.joining import join_columns, take_rows
+from engine.running.parallel import run_chunks
 from engine.solids.ragged import summed
 from engine.types import BoolArray, FloatArray, Int32Array, IntArray, read_only
 

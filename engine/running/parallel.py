@@ -24,14 +24,14 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import lru_cache
 from math import ceil, sqrt
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, Final, TypedDict
+from typing import Final, TypedDict
 
 import numpy as np
 
@@ -356,53 +356,3 @@ def _run_threaded(
             raise min(run.failures, key=lambda failure: failure[0])[1]
         finally:
             run.failures.clear()  # each leads to frames that lead here: a search for cycles would have to free them
-
-
-_FEW_BYTES: Final = 1 << 22
-"""Size of arrays up to which one thread copies them."""
-
-
-def join_columns(
-    parts: Sequence[Sequence[Any]], budget: Budget, workers: int | None, axes: Sequence[int] | None = None
-) -> list[Any]:
-    """Return arrays of parts, at least one, concatenated column by column along ``axes``, by default the first.
-
-    Large ones are copied by several threads, which touch the memory of the result first. Raises: as `Budget.check`.
-    """
-    if len(parts) == 1:
-        return list(parts[0])
-    columns = list(zip(*parts))
-    axes = axes or [0] * len(columns)
-    if sum(array.nbytes for column in columns for array in column) < _FEW_BYTES:
-        return [np.concatenate(column, axis) for column, axis in zip(columns, axes)]
-    ends = [np.cumsum([array.shape[axis] for array in column]) for column, axis in zip(columns, axes)]
-    joined, moved = [], []
-    for column, axis, each in zip(columns, axes, ends):
-        shape = list(column[0].shape)
-        shape[axis] = int(each[-1])
-        joined.append(np.empty(shape, column[0].dtype))
-        moved.append(np.moveaxis(joined[-1], axis, 0))
-
-    def copy(first: int, last: int) -> None:
-        for part in range(first, last):
-            budget.check()
-            for column, axis, into, each in zip(columns, axes, moved, ends):
-                n = column[part].shape[axis]
-                into[each[part] - n : each[part]] = np.moveaxis(column[part], axis, 0)
-
-    run_chunks(copy, len(parts), budget=budget, first_chunk=1, workers=workers)
-    return joined
-
-
-def take_rows(arrays: Sequence[Any], rows: Any, budget: Budget, workers: int | None) -> list[Any]:
-    """Return the rows of arrays, all of one length, at places ``rows``; many by several threads, as `join_columns`."""
-    if not len(rows) or sum(len(rows) * array[:1].nbytes for array in arrays) < _FEW_BYTES:
-        return [array[rows] for array in arrays]
-    taken = [np.empty((len(rows), *array.shape[1:]), array.dtype) for array in arrays]
-
-    def take(first: int, last: int) -> None:
-        for array, into in zip(arrays, taken):
-            np.take(array, rows[first:last], axis=0, out=into[first:last], mode="clip")  # others copy once more
-
-    run_chunks(take, len(rows), budget=budget, first_chunk=1 << 14, workers=workers)
-    return taken

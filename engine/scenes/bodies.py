@@ -236,6 +236,8 @@ def _csg_box(operation: str, boxes: list[tuple[FloatArray, FloatArray]]) -> tupl
 
 
 _MANY: Final = 4096
+_BLOCK: Final = 1 << 15
+"""Segments from which they are put in order; how many are ordered together."""
 _AS_GIVEN: Final = read_only(np.arange(_MANY))
 
 
@@ -287,14 +289,17 @@ def _address(array: Any) -> int:
 
 def order_of(segments: FloatArray, t: float, where: Any, budget: Budget, workers: int | None) -> IntArray:
     """Return an order of segments (n, 2, dim) in which neighbours in space, at parameter t, follow each other, for the
-    cache; few stay as given. where: `Where` of the bodies."""
+    cache, block by block; few stay as given. where: `Where` of the bodies."""
     n = len(segments)
     if n < _MANY:
         return _AS_GIVEN[:n]
-    keys = np.empty(n, np.uint16)
+    order = np.empty(n, np.int64)
 
     def task(first: int, last: int) -> None:
-        entry_of(put_keys)(segments[first:last], t, where.together, keys[first:last])
+        for begin in range(first * _BLOCK, min(last * _BLOCK, n), _BLOCK):
+            some = segments[begin : begin + _BLOCK]
+            entry_of(put_keys)(some, t, where.together, keys := np.empty(len(some), np.uint16))
+            np.add(np.argsort(keys, kind="stable"), begin, out=order[begin : begin + _BLOCK])
 
-    run_chunks(task, n, budget=budget, workers=workers, first_chunk=_MANY)
-    return read_only(np.argsort(keys, kind="stable"))
+    run_chunks(task, -(-n // _BLOCK), budget=budget, workers=workers, first_chunk=1)
+    return read_only(order)

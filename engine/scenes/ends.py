@@ -23,7 +23,8 @@ from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, grow, grow_product, magnitude
 from engine.predicates.parameters import compare_products
 from engine.running.budget import UNLIMITED, Budget
-from engine.running.parallel import join_columns, run_chunks
+from engine.running.joining import join_columns
+from engine.running.parallel import run_chunks
 from engine.scenes.near_boxes import N_BODIES, NAMES, PLACED, place_in
 from engine.scenes.posed_cut import mesh_at
 from engine.segment_clipping.exact_pieces import ONE, ZERO, Parameter, compare

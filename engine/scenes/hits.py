@@ -15,7 +15,8 @@ from engine.containment.methods.rational_locate import to_body_frame, to_world_f
 from engine.errors import UnsupportedSolidError
 from engine.predicates.error_free import two_diff
 from engine.running.budget import Budget, Cancel, reading
-from engine.running.parallel import Progress, check_options, join_columns
+from engine.running.joining import join_columns
+from engine.running.parallel import Progress, check_options
 from engine.scenes.near_boxes import near_pairs, scratch_for
 from engine.scenes.placements import Placements
 from engine.scenes.posed_cut import _turned

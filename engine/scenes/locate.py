@@ -22,7 +22,8 @@ from engine.containment.methods.filters import in_space
 from engine.containment.methods.rational_locate import is_located
 from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
-from engine.running.parallel import Progress, join_columns, run_chunks
+from engine.running.joining import join_columns, join_sizes
+from engine.running.parallel import Progress, run_chunks
 from engine.scenes.location_tables import LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.placements import Placements
@@ -153,8 +154,8 @@ def split_keys(
         n_hits[pair // n_bodies - start] += 1
 
 
-_NO_KEYS: Final = np.zeros(0, np.int8), np.zeros(0, np.int64), np.zeros(0, np.int64)
-"""The columns of `split_keys` without keys."""
+_NO_KEYS: Final = np.zeros(0, np.int8), np.zeros(0, np.int64)
+"""The columns of `split_keys` by key, without keys."""
 
 
 def locate_all(
@@ -191,19 +192,19 @@ def locate_all(
         query_counts.append(counted)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress)
-    joined: Any = join_columns([_NO_KEYS, *(parts[start] for start in sorted(parts))], budget, workers)
+    each = [parts[start] for start in sorted(parts)]
+    located, bodies = join_columns([_NO_KEYS, *(part[:2] for part in each)], budget, workers)
+    offsets = join_sizes([part[2] for part in each], budget, workers)
     if query_counts and len(tables.sizes):
         has_new = _build_trees(scene, np.sum(query_counts, axis=0), budget, workers)
-    located, bodies, n_hits = joined
     left = np.flatnonzero(located == UNDECIDED)
     counts, is_exact = Counts(0, 0), scene.base.is_exact
     if len(left):
-        owners = np.repeat(np.arange(n), n_hits)
+        owners = np.repeat(np.arange(n), np.diff(offsets))
         located[left], counts = _locate_exactly(points, owners[left], bodies[left], scene, has_new, budget, workers)
         is_hit = located >= 0
-        located, bodies, n_hits = located[is_hit], bodies[is_hit], np.bincount(owners[is_hit], minlength=n)
-    offsets = np.zeros(n + 1, np.int64)
-    np.cumsum(n_hits, out=offsets[1:])
+        located, bodies = located[is_hit], bodies[is_hit]
+        np.cumsum(np.bincount(owners[is_hit], minlength=n), out=offsets[1:])
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
     n_beyond = min(n, sum(beyond) + counts.beyond)
     accuracy = Accuracy(decisions, None, n, n_beyond, min(n, counts.rational), "box_grid")

@@ -23,7 +23,7 @@ from engine.scenes.placements import Placements
 from engine.scenes.point_queries import PointQueries
 from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.base import Solid, _collect_arrays
-from engine.solids.checks import as_point_groups, shown
+from engine.solids.checks import as_point_groups, check_finite, shown
 from engine.solids.pose import Pose
 from engine.types import Accuracy, BoolArray, FloatArray
 
@@ -300,11 +300,12 @@ class Scene(PointQueries):
         check_options(workers, progress, report=report)
         if not isinstance(keep, str) or keep not in ("all", "first", "any"):
             raise InvalidOperationError(f"keep must be all, first or any, got {shown(keep)}", ("keep",))
-        array = as_point_groups(segments, 2, self.solids[0].dimension if len(self) else None, ("segments",))
+        dimension, where = self.solids[0].dimension if len(self) else None, ("segments",)
+        array = as_point_groups(segments, 2, dimension, where, must_be_finite=False)
         n = len(array)
         counts = Counts(n)
         with Budget(deadline, cancel) as budget:
-            budget.check()
+            check_finite(array, where, budget, workers)
             self._placements.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):

@@ -14,7 +14,8 @@ from engine.compiling.jit import entry_of
 from engine.errors import InvalidOperationError
 from engine.predicates.rational import nearest_float
 from engine.running.budget import Budget, Cancel, reading
-from engine.running.parallel import Progress, check_options, join_columns, run_chunks
+from engine.running.joining import join_columns
+from engine.running.parallel import Progress, check_options, run_chunks
 from engine.segment_clipping import hit_search
 from engine.segment_clipping.exact_hits import ExactHit, exact_hits, exact_normal, near_elements
 from engine.segment_clipping.hit_contacts import fill_normals

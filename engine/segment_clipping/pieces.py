@@ -11,7 +11,7 @@ import numpy as np
 from engine.compiling.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
 from engine.running.budget import UNLIMITED, Budget
-from engine.running.parallel import join_columns
+from engine.running.joining import join_columns
 from engine.types import FloatArray
 
 Triple = tuple[float, float, float]

@@ -17,9 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.errors import EmptyGeometryError, EngineError, InvalidArrayError, NotFiniteError, WrongDimensionError
-from engine.running.budget import poll, polled
+from engine.running.budget import UNLIMITED, Budget, poll, polled
+from engine.running.parallel import run_chunks
 from engine.solids.geometries import lines_in, note_altitude, positions_in
-from engine.types import BoolArray, FloatArray, IntArray, read_only
+from engine.types import FloatArray, IntArray, read_only
 
 Where = tuple[str | int, ...]
 
@@ -220,17 +221,22 @@ def _path(index: int, shape: list[int], where: Where) -> Where:
     return (*where, *map(int, np.unravel_index(index, shape)))
 
 
-def check_finite(array: FloatArray, where: Where) -> None:
-    """Raise for the first NaN or infinity of an array."""
+def check_finite(array: FloatArray, where: Where, budget: Budget = UNLIMITED, workers: int | None = 1) -> None:
+    """Raise for the first NaN or infinity of an array; many are looked for by several threads."""
     flat = array.reshape(-1)
     if len(flat) <= _FEW and math.isfinite(sum(flat.tolist())):
         return
-    for start in range(0, len(flat), _BLOCK):
-        finite: BoolArray = np.isfinite(flat[start : start + _BLOCK])
-        if not finite.all():
-            index = start + int(finite.argmin())
-            path = _path(index, list(array.shape), where)
-            raise NotFiniteError(f"{spell(path)} is {float(flat[index])!r}; only finite numbers have a place", path)
+    are_finite: list[bool] = []
+
+    def look(first: int, last: int) -> None:
+        poll()
+        are_finite.append(bool(np.isfinite(flat[first:last]).all()))
+
+    run_chunks(look, len(flat), budget=budget, workers=workers, first_chunk=_BLOCK)
+    if not all(are_finite):
+        index = int(np.isfinite(flat).argmin())
+        path = _path(index, list(array.shape), where)
+        raise NotFiniteError(f"{spell(path)} is {float(flat[index])!r}; only finite numbers have a place", path)
 
 
 def check_dimension(n_columns: int, dimension: int | None, where: Where, what: str = "positions of") -> None:

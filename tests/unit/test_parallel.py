@@ -18,7 +18,8 @@ import pytest
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 from engine.running import parallel
 from engine.running.budget import Budget, Cancel
-from engine.running.parallel import Ranges, check_options, is_unlimited, join_columns, run_chunks, threads_that_pay
+from engine.running.joining import join_columns
+from engine.running.parallel import Ranges, check_options, is_unlimited, run_chunks, threads_that_pay
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, None])
