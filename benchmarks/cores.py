@@ -55,7 +55,7 @@ def _discs(n: int, seed: int) -> list[engine.Polygon]:
     return [engine.Polygon([ring]) for ring in middles + draw.uniform(0.3, 0.8, (n, 1, 1)) * circle]
 
 
-def _workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
+def workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
     """Yield name, number of items and question."""
     draw = generator("cores", seed)
     n = lambda most: max(16, int(most * items))  # noqa: E731
@@ -97,7 +97,7 @@ def _workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
     yield "union of circles", len(discs), lambda workers: engine.union_all(discs, workers=workers)
 
 
-def _digest(answer: Any) -> str:
+def digest_of(answer: Any) -> str:
     """Return a hash of all arrays of an answer."""
     named = [getattr(answer, field.name) for field in fields(answer)] if is_dataclass(answer) else [answer]
     summed = hashlib.sha256()
@@ -111,7 +111,7 @@ def measure(question: Question, counts: list[int | None]) -> dict[str, Any]:
     """Return the least wall and CPU seconds by number of workers, and whether all answers have the same bytes."""
     wall: dict[str, list[float]] = {str(count or "default"): [] for count in counts}
     cpu: dict[str, list[float]] = {name: [] for name in wall}
-    digests = {_digest(question(count)) for count in counts}
+    digests = {digest_of(question(count)) for count in counts}
     for turn in range(ROUNDS):
         for name, count in list(zip(wall, counts))[:: 1 if turn % 2 else -1]:
             for kept, took in zip((wall, cpu), clocked(lambda count=count: question(count))):
@@ -180,7 +180,7 @@ def _least(question: Callable[[], Any]) -> float:
 def _simulate(given: argparse.Namespace) -> int:
     """Print predicted speed-ups, powers of two up to so many cores."""
     counts = [2**k for k in range(1, given.simulate.bit_length())]
-    for name, n_items, question in _workloads(given.items, given.seed):
+    for name, n_items, question in workloads(given.items, given.seed):
         if given.only in name:
             question(1), question(given.simulate)
             row = predict(question, counts, ROUNDS)
@@ -212,7 +212,7 @@ def main(words: list[str]) -> int:
     counts: list[int | None] = [2**k for k in range(machine.cores().bit_length()) if 2**k <= machine.cores()]
     counts = [int(count) for count in given.workers.split(",")] if given.workers else [*counts, None]
     result: dict[str, Any] = {"facts": machine.facts(given.seed, machine.cores()), "threads": {}}
-    for name, n_items, question in _workloads(given.items, given.seed):
+    for name, n_items, question in workloads(given.items, given.seed):
         if given.only in name:
             row = result["threads"][name] = measure(question, counts) | {"items": n_items}
             ratios = "  ".join(f"{count}: {ratio:5.2f}" for count, ratio in row["speed_up"].items())
