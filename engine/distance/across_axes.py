@@ -1,10 +1,11 @@
-"""Nearest points of two convex bodies that lie apart along axes: flush boxes, plates, parts on one lattice.
+"""Nearest points of two bodies that lie apart along axes: flush boxes, plates, parts on one lattice.
 
 If all of one body has x <= a, and all of the other x >= b > a, these planes are the walls of a gap, and no points are
 nearer than b - a. On every axis with a gap both coordinates are bounded so; points on all walls, and straight across on
 the other axes, are exactly as near as the gaps allow. Triangles that have some on the walls are compared as the points,
 edges and triangles that they have there, seen along the gaps, in the order of their faces: the first two with a common
-point are the answer, which is a corner of one of them. Where only edges cross, or none meet, nothing is proven.
+point are the answer: a corner of one of them, or where edges along two axes cross. Where other edges cross, or no two
+triangles meet, nothing is proven.
 
 Exact: images of vertices are doubles, which is tested, and signs are those of `orient2d`.
 """
@@ -112,9 +113,23 @@ def _seen(p: Point3, gaps: tuple[bool, bool, bool]) -> Point2:
 
 
 @inline
+def _unseen(t: Point2, gaps: tuple[bool, bool, bool]) -> Point3:
+    """Return a point that is seen as t, with any coordinates on axes with gaps."""
+    if gaps[0]:
+        return Point3(0.0, t.x, t.y)
+    return Point3(t.x, 0.0, t.y) if gaps[1] else Point3(t.x, t.y, 0.0)
+
+
+@inline
 def _number(part: Part, place: int) -> int:
     """Return the corner of the triangle that is number ``place`` of its part."""
     return part.k if place == 0 else (part.l if place == 1 else 2)
+
+
+@inline
+def _edge(part: Part, place: int) -> int:
+    """Return the code of edge ``place`` of a part of two or three corners."""
+    return 3 + (place if part.n == 3 else (part.k if part.l == part.k + 1 else part.l))
 
 
 @called
@@ -130,7 +145,7 @@ def _code_at(t: Point2, part: Part, a: Point2, b: Point2, c: Point2) -> int:
         if side == UNDECIDED:
             return _UNKNOWN
         is_between = min(a.x, b.x) <= t.x <= max(a.x, b.x) and min(a.y, b.y) <= t.y <= max(a.y, b.y)
-        return (3 + (part.k if part.l == part.k + 1 else part.l)) if side == 0 and is_between else _OUTSIDE
+        return _edge(part, 0) if side == 0 and is_between else _OUTSIDE
     turn, ab, bc, ca = orient2d(a, b, c), orient2d(a, b, t), orient2d(b, c, t), orient2d(c, a, t)
     if turn == 0 or UNDECIDED in (turn, ab, bc, ca):
         return _UNKNOWN
@@ -153,24 +168,30 @@ def _may_cross(a: Point2, b: Point2, p: Point2, q: Point2) -> bool:
 
 
 @inline
-def _common_corner(
+def _common_point(
     own: Part, a: tuple[Point2, Point2, Point2], their: Part, b: tuple[Point2, Point2, Point2]
-) -> tuple[int, int, bool]:
-    """Return the codes of two features that have a corner of either part in common, and whether it is one of the first;
-    _OUTSIDE if the parts have no common point, _UNKNOWN if that is not proven. a, b: corners of the parts."""
+) -> tuple[int, int, Point2]:
+    """Return the codes of two features and a point of both, a corner of either part or where edges along two axes
+    cross; _OUTSIDE if the parts have no common point, _UNKNOWN if that is not proven. a, b: corners of the parts."""
     for place in range(own.n):
         code = _code_at(a[place], their, b[0], b[1], b[2])
         if code != _OUTSIDE:
-            return _number(own, place), code, True
+            return _number(own, place), code, a[place]
     for place in range(their.n):
         code = _code_at(b[place], own, a[0], a[1], a[2])
         if code != _OUTSIDE:
-            return code, _number(their, place), False
+            return code, _number(their, place), b[place]
+    is_unknown = False
     for i in range(own.n if own.n != 2 else 1):
         for j in range(their.n if their.n != 2 else 1):
-            if own.n > 1 and their.n > 1 and _may_cross(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]):
-                return _UNKNOWN, _UNKNOWN, True
-    return _OUTSIDE, _OUTSIDE, True
+            p, q, s, t = a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]
+            if own.n > 1 and their.n > 1 and _may_cross(p, q, s, t):
+                if p.x == q.x and s.y == t.y:
+                    return _edge(own, i), _edge(their, j), Point2(p.x, s.y)
+                if p.y == q.y and s.x == t.x:
+                    return _edge(own, i), _edge(their, j), Point2(s.x, p.y)
+                is_unknown = True
+    return (_UNKNOWN, _UNKNOWN, a[0]) if is_unknown else (_OUTSIDE, _OUTSIDE, a[0])
 
 
 @inline
@@ -185,12 +206,19 @@ def _moved(x: float, gap: Wide, size: Wide, radius: float) -> tuple[float, bool]
     return end.h, is_correctly_rounded(end.h, end.low, _BOUND * (abs(x) + radius))
 
 
+class Faces(NamedTuple):
+    """The triangles (m, 3) of a body, and the face of each (m,), ascending; both are empty for a ball."""
+
+    triangles: IntArray
+    faces: IntArray
+
+
 @called
 def nearest_across(
-    a: PlacedBody, triangles: IntArray, b: PlacedBody, other_triangles: IntArray, points: FloatArray, row: IntArray
+    a: PlacedBody, mesh: Faces, b: PlacedBody, other_mesh: Faces, points: FloatArray, row: IntArray
 ) -> float:
-    """Return the distance of two convex bodies and fill points (2, 3) and row (4,), as `nearest_of_convex` does; NaN
-    where they do not lie apart along axes, or any of it is unproven."""
+    """Return the distance of two bodies and fill points (2, 3) and row (4,), as `nearest_of_convex` does; NaN where
+    they do not lie apart along axes, or any of it is unproven."""
     if not (_are_images_exact(a) and _are_images_exact(b)):
         return np.nan
     (low, high), (other_low, other_high) = _box_of(a), _box_of(b)
@@ -200,26 +228,33 @@ def nearest_across(
     wall, other, gaps = Point3(x, y, z), Point3(other_x, other_y, other_z), (has_x, has_y, has_z)
     if not (has_x or has_y or has_z):
         return np.nan
+    triangles, others, best = mesh.triangles, other_mesh.triangles, Point2(0.0, 0.0)
+    row[0] = row[2] = -1
+    is_found, face, their_face = False, -1, -1
     for i in range(max(1, triangles.shape[0])):
         own = _part_of(a, triangles, i, wall, gaps)
+        if own.n == 0 or (is_found and mesh.faces.size > 0 and mesh.faces[i] != face):
+            continue
         p, q = _corner(a, triangles, i, own.k), _corner(a, triangles, i, own.l)
         corners = _seen(p, gaps), _seen(q, gaps), _seen(_corner(a, triangles, i, 2), gaps)
-        for j in range(max(1, other_triangles.shape[0]) if own.n > 0 else 0):
-            their = _part_of(b, other_triangles, j, other, gaps)
+        for j in range(max(1, others.shape[0])):
+            if is_found and (other_mesh.faces.size == 0 or other_mesh.faces[j] >= their_face):
+                break
+            their = _part_of(b, others, j, other, gaps)
             if their.n == 0:
                 continue
-            s, t = _corner(b, other_triangles, j, their.k), _corner(b, other_triangles, j, their.l)
-            others = _seen(s, gaps), _seen(t, gaps), _seen(_corner(b, other_triangles, j, 2), gaps)
-            code, their_code, is_own = _common_corner(own, corners, their, others)
-            if code == _OUTSIDE:
-                continue
+            s, t = _corner(b, others, j, their.k), _corner(b, others, j, their.l)
+            their_corners = _seen(s, gaps), _seen(t, gaps), _seen(_corner(b, others, j, 2), gaps)
+            code, their_code, seen = _common_point(own, corners, their, their_corners)
             if code == _UNKNOWN or their_code == _UNKNOWN:
                 return np.nan
-            row[0], row[1] = (i if triangles.shape[0] > 0 else -1), code
-            row[2], row[3] = (j if other_triangles.shape[0] > 0 else -1), their_code
-            at = _corner(a, triangles, i, code) if is_own else _corner(b, other_triangles, j, their_code)
-            return _measured(at, wall, other, gaps, (a.round, b.round), points)
-    return np.nan
+            if code != _OUTSIDE:
+                is_found, best, row[1], row[3] = True, seen, code, their_code
+                if mesh.faces.size > 0:
+                    row[0], face = i, mesh.faces[i]
+                if other_mesh.faces.size > 0:
+                    row[2], their_face = j, other_mesh.faces[j]
+    return _measured(_unseen(best, gaps), wall, other, gaps, (a.round, b.round), points) if is_found else np.nan
 
 
 @called

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, Unpack, overload
 
 import numpy as np
@@ -17,7 +17,7 @@ from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
 from engine.distance import forms
-from engine.distance.convex_nearest import fill_gaps_of_hulls, nearest_of_hulls
+from engine.distance.convex_nearest import fill_gaps_of_hulls, nearest_of_hulls, nearest_of_meshes
 from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
@@ -198,7 +198,8 @@ def _measured(first: Solid, second: Solid, poses: Poses, least: float | None, bu
     if do_meet(first, second, poses, budget):
         return forms.MEETING if least is None else False
     if not planes:
-        return spread_pair(first, second, poses, budget).clearance(0)
+        settle = partial(nearest_of_meshes, first, second, poses) if first.dimension == 3 else lambda: None
+        return spread_pair(first, second, poses, budget).clearance(0, settle)
     gap, features = forms.gap_of_planes(first, second, poses, budget)
     return gap.clearance(features, first.dimension) if least is None else gap.is_at_least(Fraction(least))
 

@@ -14,18 +14,27 @@ from __future__ import annotations
 from collections import namedtuple
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.convex_body import REACH, ConvexArrays, convex_body_of, point_of, pool_of_one
+from engine.collision.convex_body import (
+    N_NUMBERS,
+    REACH,
+    ConvexArrays,
+    ConvexBody,
+    convex_body_of,
+    point_of,
+    pool_of_one,
+    used_by_faces,
+)
 from engine.collision.convex_pair import PlacedBody, placed_body
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays, rotate
 from engine.collision.result import Clearance, Feature, Poses
 from engine.compiling.jit import called, entry_of, inline, kernel, merged
-from engine.distance.across_axes import nearest_across
+from engine.distance.across_axes import Faces, nearest_across
 from engine.distance.closed_forms import Wide3, less3
 from engine.distance.convex_gaps import (
     FOUND,
@@ -43,8 +52,8 @@ from engine.distance.spreads import feature_of
 from engine.predicates.vectors import dot, minus
 from engine.running.budget import Budget
 from engine.solids.base import Solid
-from engine.solids.mesh import Polyhedron
-from engine.types import FlagArray, FloatArray, IntArray, Point3
+from engine.solids.mesh import Mesh, Polyhedron
+from engine.types import FlagArray, FloatArray, IntArray, Point3, read_only
 
 MOST_TRIANGLES: Final = 2048
 """Most triangles of a body that is searched so: a walk looks at all vertices, a tree leads to few."""
@@ -82,21 +91,50 @@ def hull_of(solid: Solid) -> Hull | None:
         if body is None:
             return None
         faces = solid.triangle_faces if isinstance(solid, Polyhedron) else np.arange(len(body.triangles)) // 2
-        named = _Named(body.points.T, body.triangles, faces)
-        return Hull(solid, pool_of_one(body), named, {})
+        return _as_hull(solid, body, faces)
 
     return solid.prepared("hull", build)
 
 
+def _as_hull(solid: Solid, body: ConvexBody, faces: IntArray) -> Hull:
+    """Return the `Hull` of a body; faces: of its triangles."""
+    ascending = read_only(np.array(faces, np.int64))
+    return Hull(solid, pool_of_one(body), _Named(body.points.T, body.triangles, ascending), {})
+
+
+def _mesh_of(solid: Solid) -> Hull | None:
+    """Return a body as `hull_of` does, or a mesh of few faces that is not convex. Cached."""
+
+    def build() -> Hull | None:
+        if not isinstance(solid, Mesh) or not 0 < len(solid.triangles) <= MOST_TRIANGLES:
+            return None
+        vertices, triangles = used_by_faces(solid)
+        points, numbers = np.ascontiguousarray(vertices.T), np.zeros(N_NUMBERS)
+        body = ConvexBody(points, np.empty((4, len(triangles))), read_only(triangles), numbers)
+        return _as_hull(solid, body, solid.triangle_faces)
+
+    return hull_of(solid) or solid.prepared("mesh across axes", build)
+
+
 def nearest_of_hulls(first: Solid, second: Solid, poses: Poses) -> Clearance | None:
     """Return the clearance of two bodies of space under poses; None if they are not proven to be convex, apart and
-    with one nearest pair of points."""
-    a, b = hull_of(first), hull_of(second)
+    with one nearest pair of points, or apart along axes."""
+    return _answer(nearest_of_convex, hull_of(first), hull_of(second), poses)
+
+
+def nearest_of_meshes(first: Solid, second: Solid, poses: Poses) -> Clearance | None:
+    """Return the clearance of two bodies of space under poses, convex or not; None if they are not proven to be apart
+    along axes."""
+    return _answer(nearest_along_axes, _mesh_of(first), _mesh_of(second), poses)
+
+
+def _answer(nearest: Any, a: Hull | None, b: Hull | None, poses: Poses) -> Clearance | None:
+    """Return what a kernel says of two bodies, if it proves anything."""
     if a is None or b is None:
         return None
     own, their = (STILL if at is None else PoseArrays(at.rotation[None], at.translation[None], True) for at in poses)
     points, row = np.empty((2, 3)), np.empty(4, np.int64)
-    distance = entry_of(nearest_of_convex)(a.pool, own, b.pool, their, points, row)
+    distance = entry_of(nearest)(a.pool, a.named.faces, own, b.pool, b.named.faces, their, points, row)
     if not distance > 0.0:
         return None
     points.setflags(write=False)
@@ -189,15 +227,27 @@ def _measure_on_faces(
 
 @kernel
 def nearest_of_convex(
-    first: ConvexArrays, first_pose: PoseArrays, second: ConvexArrays, second_pose: PoseArrays, points: FloatArray,
-    row: IntArray,
+    first: ConvexArrays, faces: IntArray, first_pose: PoseArrays, second: ConvexArrays, second_faces: IntArray,
+    second_pose: PoseArrays, points: FloatArray, row: IntArray,
 ) -> float:  # fmt: skip
     """Return the distance of two convex bodies, the nearest double, and fill points (2, 3) with the nearest points and
     row (4,) with a triangle and the code of the feature in it of each body; NaN where any of it is unproven. Of several
-    triangles the first is named."""
+    triangles the first is named. faces, second_faces: of the triangles."""
     a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
     distance = _only_nearest(first, first_pose, second, second_pose, points, row)
-    return distance if distance > 0.0 else nearest_across(a, first.triangles, b, second.triangles, points, row)
+    mesh, other = Faces(first.triangles, faces), Faces(second.triangles, second_faces)
+    return distance if distance > 0.0 else nearest_across(a, mesh, b, other, points, row)
+
+
+@kernel
+def nearest_along_axes(
+    first: ConvexArrays, faces: IntArray, first_pose: PoseArrays, second: ConvexArrays, second_faces: IntArray,
+    second_pose: PoseArrays, points: FloatArray, row: IntArray,
+) -> float:  # fmt: skip
+    """As `nearest_of_convex`, of bodies that need not be convex; only their vertices and triangles are read."""
+    a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
+    mesh, other = Faces(first.triangles, faces), Faces(second.triangles, second_faces)
+    return nearest_across(a, mesh, b, other, points, row)
 
 
 @called

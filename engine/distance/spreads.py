@@ -7,7 +7,7 @@ solid.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 from math import isfinite, nextafter
@@ -72,12 +72,15 @@ class SpreadPair:
         self._room = _room()
         self._reach = 4.0 * (a.arrays.extent.reach + b.arrays.extent.reach) + sum(self._radii)
 
-    def clearance(self, item: int) -> Clearance:
-        """Return distance, nearest points and features of two disjoint bodies under pose `item`."""
+    def clearance(self, item: int, settle: Callable[[], Clearance | None] = lambda: None) -> Clearance:
+        """Return distance, nearest points and features of two disjoint bodies under pose `item`. settle: may know the
+        answer, and is asked before integers are."""
         query, answers = Query(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
         how, _, pairs = next(self._unanswered(item, item + 1, answers, query))
         d = self.solids[0].dimension
         if how != ANSWERED:
+            if (settled := settle()) is not None:
+                return settled
             gap, triangles = self.least(item, pairs)
             return gap.clearance(self._features(triangles, (gap.gap.first, gap.gap.second)), d)
         i, j, *codes = next(iter(pairs))

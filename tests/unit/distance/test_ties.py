@@ -15,7 +15,8 @@ from tests.unit.collision.meshes.bodies import TURN, brick
 
 @pytest.fixture(autouse=True)
 def as_if_not_convex(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.distance.clearance.nearest_of_hulls", lambda *_: None)
+    for name in ("nearest_of_hulls", "nearest_of_meshes"):
+        monkeypatch.setattr(f"engine.distance.clearance.{name}", lambda *_: None)
 
 
 MOVES = [(0, 0, 2.5), (0.5, 0.25, 2 + 2.0**-40), (1.5, 0, 3), (2.5, 2.5, 0), (3, 3, 3), (2.25, -1, 0.5), (0, -4, 1)]
