@@ -28,15 +28,18 @@ from engine.collision.placed_outline import (
     PlacedOutline,
     place,
     relate_placed,
+    rounded,
+    rows_of,
     set_rests,
 )
 from engine.collision.result import Kind, has_faces
 from engine.compiling.jit import allocating_kernel, entry_of, inline
+from engine.predicates.vectors import as_point2
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.primitives import Aabb
 from engine.solids.ragged import summed
-from engine.types import FlagArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.types import FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point2, read_only
 
 _NONE = np.empty((0, 2)), np.zeros(1, np.int64)
 KINDS: dict[int, Kind] = {CROSSING: "edge_edge", VERTEX_EDGE: "vertex_edge", VERTEX_VERTEX: "vertex_vertex"}
@@ -117,8 +120,8 @@ def _relate(
     boxes, their_boxes = room.boxes[: 2 * n_leaves(n)], their_room.boxes[: 2 * n_leaves(m)]
     error = max(place(own, points), place(their, others))
     fill_tree(others, their.following, their_boxes)
-    a = PlacedOutline(points, own.move, own.following, own.sides, boxes)
-    b = PlacedOutline(others, their.move, their.following, their.sides, their_boxes)
+    a = rounded(points, own.following, own.sides, boxes)
+    b = rounded(others, their.following, their.sides, their_boxes)
     answer = relate_placed(a, b, error, is_boolean, stop)
     is_open = answer[0] == UNSETTLED or (is_named and answer[4] != APART and answer[2] < 0)
     if not is_open or error == 0.0:
@@ -159,8 +162,8 @@ def relate_outline_pairs(
         own = slice(pool.firsts[bodies[i]], pool.firsts[bodies[i] + 1])
         their = slice(pool.firsts[bodies[j]], pool.firsts[bodies[j] + 1])
         relation, bits, first, second, kind = _relate(
-            Body(pool.vertices[own], pool.following[own], pool.sides[own], r[i], t[i]),
-            Body(pool.vertices[their], pool.following[their], pool.sides[their], r[j], t[j]),
+            Body(pool.vertices[own], pool.following[own], pool.sides[own], rows_of(r[i]), as_point2(t, i)),
+            Body(pool.vertices[their], pool.following[their], pool.sides[their], rows_of(r[j]), as_point2(t, j)),
             room, other, is_boolean, len(contacts) > 0, stop,
         )  # fmt: skip
         if not has_detail or relation != OVERLAPPING or bits == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
@@ -183,7 +186,8 @@ def relate_two(
     boxes = np.empty((2 * (n_leaves(n) + n_leaves(m)), 4))
     at, end = 2 * n_leaves(n), 6 * n + 2 * m
     return _relate(
-        Body(vertices, following, sides, turn, move), Body(other, theirs, their_sides, their_turn, their_move),
+        Body(vertices, following, sides, rows_of(turn), Point2(move[0], move[1])),
+        Body(other, theirs, their_sides, rows_of(their_turn), Point2(their_move[0], their_move[1])),
         Room(flat[: 2 * n].reshape(n, 2), flat[2 * n : 6 * n].reshape(n, 4), boxes[:at]),
         Room(flat[6 * n : end].reshape(m, 2), flat[end:].reshape(m, 4), boxes[at:]), is_boolean, is_named, stop,
     )  # fmt: skip

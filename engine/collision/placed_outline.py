@@ -12,19 +12,20 @@ doubles, mostly, and expansions decide (J. R. Shewchuk, 1997).
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from engine.arrangement.simple_rings import BLOCK, after, fill_tree, next_leaf
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import orient2d_near
-from engine.compiling.jit import called, inline
+from engine.compiling.jit import called, inline, merged
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import add_product, compress, grow, grow_product, sign
 from engine.predicates.vectors import as_point2
-from engine.types import UNDECIDED, FlagArray, FloatArray, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point2, read_only
 
 APART, CROSSING, UNSURE, VERTEX_EDGE, VERTEX_VERTEX = range(5)
 """Classes of a pair of edges: no common point, a strict crossing, undecided, and two kinds of contacts."""
@@ -46,17 +47,20 @@ PlacedOutline = namedtuple("PlacedOutline", "points rests following sides boxes"
 | field | shape | meaning |
 |---|---|---|
 | points | (n, 2 or more) | vertices, rounded |
-| rests | (n, 4) | what rounding took, exactly: two more parts of x, then of y; unknown if it has one dimension |
+| rests | (n, 4) | what rounding took, exactly: two more parts of x, then of y; (1, 4): unknown, see `rounded` |
 | following, sides | (n,) | as in `OutlineArrays`; sides may be (0,): unknown |
 | boxes | (2 n_leaves, 4) | tree over the edges |
 """
 Body = namedtuple("Body", "vertices following sides turn move")
-"""A body before its pose, with its rotation (2, 2) and translation (2,)."""
+"""A body before its pose, with the two rows of its rotation and its translation, each a `Point2`."""
+
+
+NO_SIDES = read_only(np.empty(0, np.int8))
+"""Sides of a body that are unknown."""
 
 
 class Spot(NamedTuple):
-    """A placed vertex: x and y rounded, and two further parts of each; a `Point2` is one without these, for which code
-    of its own is compiled."""
+    """A placed vertex: x and y rounded, and two further parts of each; x1 is NaN if these are unknown."""
 
     x: float
     y: float
@@ -77,7 +81,7 @@ def _is_in_sector(by_start: int, by_end: int, turn: int, is_start: bool) -> bool
 
 
 @inline
-def _is_same_way(p: Any, s: Any, t: Any, side: int, error: float) -> bool:
+def _is_same_way(p: Spot, s: Spot, t: Spot, side: int, error: float) -> bool:
     """Return whether s and t, placed vertices, lie in one direction from p. side: the sign of the turn from s to t
     about p; error: bound on each coordinate."""
     if side != 0 or order(s, p, 0, error) != order(t, p, 0, error):
@@ -85,8 +89,8 @@ def _is_same_way(p: Any, s: Any, t: Any, side: int, error: float) -> bool:
     return order(s, p, 1, error) == order(t, p, 1, error)
 
 
-@called
-def _sector_bits(p: Any, before: Any, later: Any, side: int, c: Any, d: Any, their_side: int, error: float) -> int:
+@merged
+def _sector_bits(p: Spot, before: Spot, later: Spot, side: int, c: Spot, d: Spot, their_side: int, error: float) -> int:
     """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that two boundaries through a point p prove near p. before,
     later: neighbours of p on one boundary; c, d: on the other. side, their_side: 1 if the interior is on the left, -1
     if on the right. The interiors are sectors from s counter-clockwise to e, and from t to f; two sectors intersect if
@@ -109,36 +113,35 @@ def _contact_bits(own: PlacedOutline, edge: int, their: PlacedOutline, other: in
     `own` meets edge `other` of `their`. A vertex that is the start of one of these edges is left out: it is the end of
     the edge before."""
     after_edge, after_other = own.following[edge], their.following[other]
-    a, b, c, d = _spot(own, edge), _spot(own, after_edge), _spot(their, other), _spot(their, after_other)
+    a, b, c, d = spot_of(own, edge), spot_of(own, after_edge), spot_of(their, other), spot_of(their, after_other)
     side, their_side, bits = own.sides[edge], their.sides[other], 0
     if not _are_same(b, c, error) and _is_in_box(b, c, d, error) and _side(c, d, b, error) == 0:
-        their_later = _spot(their, their.following[after_other]) if _are_same(b, d, error) else d
-        later = _spot(own, own.following[after_edge])
+        their_later = spot_of(their, their.following[after_other]) if _are_same(b, d, error) else d
+        later = spot_of(own, own.following[after_edge])
         bits = _sector_bits(b, a, later, side, c, their_later, their_side, error)
     is_inner = not _are_same(d, a, error) and not _are_same(d, b, error)
     if is_inner and _is_in_box(d, a, b, error) and _side(a, b, d, error) == 0:
-        their_later = _spot(their, their.following[after_other])
+        their_later = spot_of(their, their.following[after_other])
         bits |= _sector_bits(d, a, b, side, c, their_later, their_side, error)
     return bits
 
 
 @inline
-def spot_of(points: FloatArray, rests: FloatArray, i: int) -> Any:
-    """Return vertex i of a placed body as a `Spot`, or as a `Point2` if rests are unknown."""
-    if rests.ndim == 1:
-        return as_point2(points, i)
-    rest = rests[i]
-    return Spot(points[i, 0], points[i, 1], rest[0], rest[1], rest[2], rest[3])
+def rounded(points: FloatArray, following: IntArray, sides: Int8Array, boxes: FloatArray) -> PlacedOutline:
+    """Return a body of which only rounded vertices are known: a tree has no node in the first row of its boxes."""
+    boxes[0, 0] = np.nan
+    return PlacedOutline(points, boxes[:1], following, sides, boxes)
 
 
 @inline
-def _spot(body: PlacedOutline, i: int) -> Any:
+def spot_of(body: PlacedOutline, i: int) -> Spot:
     """Return vertex i of a placed body."""
-    return spot_of(body.points, body.rests, i)
+    rest = body.rests[min(i, len(body.rests) - 1)]
+    return Spot(body.points[i, 0], body.points[i, 1], rest[0], rest[1], rest[2], rest[3])
 
 
 @called
-def _set_difference(e: Any, a: float, a1: float, a2: float, b: float, b1: float, b2: float) -> int:
+def _set_difference(e: FloatArray, a: float, a1: float, a2: float, b: float, b1: float, b2: float) -> int:
     """Write a + a1 + a2 - (b + b1 + b2) as an expansion to e, six places; return its length."""
     n = 0
     for part in (a2, a1, a, -b2, -b1, -b):
@@ -147,7 +150,7 @@ def _set_difference(e: Any, a: float, a1: float, a2: float, b: float, b1: float,
 
 
 @inline
-def order(p: Any, q: Any, axis: int, error: float) -> int:
+def order(p: Spot, q: Spot, axis: int, error: float) -> int:
     """Return the sign of a coordinate of p less that of q; UNDECIDED if rounding, of at most `error` a coordinate,
     leaves it open."""
     gap = p[axis] - q[axis]
@@ -157,19 +160,19 @@ def order(p: Any, q: Any, axis: int, error: float) -> int:
 
 
 @called
-def _order_exactly(p: Any, q: Any, axis: int) -> int:
+def _order_exactly(p: Spot, q: Spot, axis: int) -> int:
     """Return the exact sign of a coordinate of p less that of q, or UNDECIDED."""
-    if len(p) == 2:
+    if math.isnan(p.x1) or math.isnan(q.x1):
         return UNDECIDED
     e, at = workspace(6), 2 + 2 * axis
     return sign(e, _set_difference(e, p[axis], p[at], p[at + 1], q[axis], q[at], q[at + 1]))
 
 
 @called
-def _side_exactly(p: Any, q: Any, r: Any) -> int:
+def _side_exactly(p: Spot, q: Spot, r: Spot) -> int:
     """Return the exact sign of orient2d of three placed vertices, or UNDECIDED. Coordinates are below
     2^303 and multiples of 2^-508 (`set_rests`), products of differences multiples of 2^-1016."""
-    if len(p) == 2:
+    if math.isnan(p.x1) or math.isnan(q.x1) or math.isnan(r.x1):
         return UNDECIDED
     ax, ay, bx, by, e = workspace(6), workspace(6), workspace(6), workspace(6), workspace(144)
     m_ax = _set_difference(ax, p.x, p.x1, p.x2, r.x, r.x1, r.x2)
@@ -181,14 +184,14 @@ def _side_exactly(p: Any, q: Any, r: Any) -> int:
 
 
 @inline
-def _side(p: Any, q: Any, r: Any, error: float) -> int:
+def _side(p: Spot, q: Spot, r: Spot, error: float) -> int:
     """Return the sign of orient2d of three placed vertices, or UNDECIDED."""
     side = orient2d_near(Point2(p.x, p.y), Point2(q.x, q.y), Point2(r.x, r.y), error)
     return _side_exactly(p, q, r) if side == UNDECIDED and error > 0.0 else side
 
 
 @inline
-def _are_same(p: Any, q: Any, error: float) -> bool:
+def _are_same(p: Spot, q: Spot, error: float) -> bool:
     """Return whether two placed vertices are equal."""
     if error == 0.0:
         return p.x == q.x and p.y == q.y
@@ -196,7 +199,7 @@ def _are_same(p: Any, q: Any, error: float) -> bool:
 
 
 @inline
-def _is_in_box(p: Any, a: Any, b: Any, error: float) -> bool:
+def _is_in_box(p: Spot, a: Spot, b: Spot, error: float) -> bool:
     """Return whether p lies in the box around segment ab."""
     if error == 0.0:
         return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
@@ -214,8 +217,8 @@ def _classify_edges(own: PlacedOutline, edge: int, their: PlacedOutline, other: 
         return APART
     if max(p.y, q.y) + slack < min(r.y, s.y) or max(r.y, s.y) + slack < min(p.y, q.y):
         return APART
-    a, b = _spot(own, edge), _spot(own, own.following[edge])
-    c, d = _spot(their, other), _spot(their, their.following[other])
+    a, b = spot_of(own, edge), spot_of(own, own.following[edge])
+    c, d = spot_of(their, other), spot_of(their, their.following[other])
     by_c, by_d = _side(a, b, c, error), _side(a, b, d, error)
     if by_c * by_d == 1:  # UNDECIDED is 2
         return APART
@@ -235,18 +238,24 @@ def _classify_edges(own: PlacedOutline, edge: int, their: PlacedOutline, other: 
 
 
 @inline
+def rows_of(turn: FloatArray) -> tuple[Point2, Point2]:
+    """Return the rows of a rotation (2, 2)."""
+    return as_point2(turn, 0), as_point2(turn, 1)
+
+
+@inline
 def place(body: Body, placed: FloatArray) -> float:
     """Write the vertices of a body under its pose, rounded, to `placed`; return a bound on the error of a coordinate,
     0.0 if nothing was rounded (`placement.py`)."""
     reach, is_exact, turn, move = 0.0, True, body.turn, body.move
     for axis in range(2):  # a turn by the lattice
-        x, y = turn[axis, 0], turn[axis, 1]
+        x, y = turn[axis]
         is_exact = is_exact and x * y == 0.0 and abs(x + y) == 1.0
     for vertex in range(len(body.vertices)):
         x, y = body.vertices[vertex, 0], body.vertices[vertex, 1]
         reach = max(reach, abs(x), abs(y))
         for axis in range(2):
-            value, lost = two_sum(turn[axis, 0] * x + turn[axis, 1] * y, move[axis])
+            value, lost = two_sum(turn[axis].x * x + turn[axis].y * y, move[axis])
             is_exact = is_exact and lost == 0.0
             placed[vertex, axis] = value
     if is_exact:
@@ -267,14 +276,14 @@ def set_rests(body: Body, points: FloatArray, rests: FloatArray) -> bool:
     so coordinates are multiples of 2^-504, below 2^302."""
     e, turn, move = workspace(5), body.turn, body.move
     for axis in range(2):
-        is_safe = _is_factor(turn[axis, 0], 2.0**-100) and _is_factor(turn[axis, 1], 2.0**-100)
+        is_safe = _is_factor(turn[axis].x, 2.0**-100) and _is_factor(turn[axis].y, 2.0**-100)
         if not (is_safe and _is_factor(move[axis], 2.0**-300)):
             return False
         for vertex in range(len(body.vertices)):
             x, y = body.vertices[vertex, 0], body.vertices[vertex, 1]
             if not (_is_factor(x, 2.0**-300) and _is_factor(y, 2.0**-300)):
                 return False
-            n = grow_product(e, grow_product(e, 0, turn[axis, 0], x), turn[axis, 1], y)
+            n = grow_product(e, grow_product(e, 0, turn[axis].x, x), turn[axis].y, y)
             n = compress(e, grow(e, n, move[axis]) if move[axis] != 0.0 else n)
             if n > 3:
                 return False
@@ -285,14 +294,14 @@ def set_rests(body: Body, points: FloatArray, rests: FloatArray) -> bool:
 
 
 @inline
-def inside(p: Any, body: PlacedOutline, error: float) -> int:
+def inside(p: Spot, body: PlacedOutline, error: float) -> int:
     """Return 1 if p is inside the rings of a placed body (even-odd), 0 outside, ON_EDGE, or UNSURE. error: bound on
     each coordinate."""
     is_inside, leaves, slack = 0, len(body.boxes) // 2, 2.0 * error
     leaf = next_leaf(body.boxes, 1, p.x - slack, p.y - slack, np.inf, p.y + slack)
     while leaf > 0:  # bound: each leaf once
         for edge in range(BLOCK * (leaf - leaves), min(BLOCK * (leaf - leaves + 1), len(body.following))):
-            a, b = _spot(body, edge), _spot(body, body.following[edge])
+            a, b = spot_of(body, edge), spot_of(body, body.following[edge])
             if max(a.x, b.x) + slack < p.x or min(a.y, b.y) > p.y + slack or max(a.y, b.y) + slack < p.y:
                 continue
             from_a, from_b = order(a, p, 1, error), order(b, p, 1, error)
@@ -321,7 +330,7 @@ def _rings_inside(own: PlacedOutline, their: PlacedOutline, error: float, stop: 
             continue
         if stop[0] != 0:
             return _MAYBE
-        where = inside(_spot(own, vertex), their, error)
+        where = inside(spot_of(own, vertex), their, error)
         if where != ON_EDGE:
             bits |= _IN if where == 1 else (_OUT if where == 0 else _MAYBE)
     return bits

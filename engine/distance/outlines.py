@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.arrangement.simple_rings import BLOCK, n_leaves
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.placed_outline import PlacedOutline, inside, relate_placed
+from engine.collision.placed_outline import NO_SIDES, PlacedOutline, inside, relate_placed, rounded, spot_of
 from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Placed, VertexEdge, Wide2, foot_of, measure, minus2, place, point
@@ -271,7 +271,7 @@ def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> 
 @inline
 def _outline(a: Placed) -> PlacedOutline:
     """Return a placed body for signs, without sides and what rounding took."""
-    return PlacedOutline(a.points, a.boxes[0], a.following, a.following[:0], a.boxes)
+    return rounded(a.points, a.following, NO_SIDES, a.boxes)
 
 
 @called
@@ -297,7 +297,7 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look, stop: FlagArray) -> 
             break
     if len(a.following) == 1 or len(b.following) == 1:
         ball, other = (a, b) if len(a.following) == 1 else (b, a)
-        where = inside(as_point2(ball.points, 0), _outline(other), error)
+        where = inside(spot_of(_outline(ball), 0), _outline(other), error)
         return 1 - where if where < 2 else -1
     return _related(a, b, error, stop)
 
