@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from engine.compiling.cold_start import PLAIN_ERRORS
 from engine.compiling.kernel_cache import cache_folder, check_owner, seal, seed
 from engine.running.parallel import Progress
 from engine.warmup import GROUPS, warm
@@ -38,7 +39,8 @@ def _warm_elsewhere(options: Options) -> None:
     """Run `warm` in new processes, since the compiler reads its CPU and cache folder only once."""
     processes = "1" if options.into else str(options.processes)
     command = [sys.executable, "-P", "-m", "exact_geometry", "warm", "--processes", processes]
-    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "PYTHONHASHSEED": "0"}
+    paths = os.pathsep.join(filter(None, sys.path))
+    surroundings = {**os.environ, **PLAIN_ERRORS, "PYTHONPATH": paths, "PYTHONHASHSEED": "0"}
     if options.cpu:
         surroundings |= {"NUMBA_CPU_NAME": options.cpu, "NUMBA_CPU_FEATURES": ""}
     with TemporaryDirectory() as temporary:

@@ -111,7 +111,7 @@ def warm(
             if progress is not None:
                 progress(100 * ended // total - before)
 
-        filled = fill_cache(__name__, SHARES, processes, report, chosen)
+        filled = fill_cache(__name__, SHARES, processes, report, chosen, RELATED)
         for index in chosen:
             STEPS[index]()
             if index not in filled:
@@ -352,10 +352,13 @@ STEPS = (
     _warm_overlay_rest,
     _warm_cells,
 )
-"""Parts of the work, long ones first; a kernel that several need is compiled by the first, or in several processes."""
-SHARES = (18, 15, 14, 13, 8, 10, 8, 3, 3, 2, 2, 3, 1)
-"""Duration of each of `STEPS`, in per cent."""
-GROUPS = ((1, 4, 6, 2, 7, 8), (0, 3, 5, 11, 9, 10, 12))
+"""Parts of the work; a kernel that several need is compiled by the first, or in several processes."""
+SHARES = (14, 16, 20, 4, 3, 6, 10, 6, 6, 5, 2, 6, 2)
+"""Duration of each of `STEPS`, in the order of `GROUPS`, in per cent."""
+RELATED = ((1, 4, 6, 7), (0, 11), (2, 3, 5), (8, 9, 10, 12))
+"""Indices of steps that compile much the same, long ones first: one process calls them, since what two processes need
+both compile."""
+GROUPS = (RELATED[0] + RELATED[3], RELATED[1] + RELATED[2])
 """Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
 decides symbols and inlining. What both compile is that of the first."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)

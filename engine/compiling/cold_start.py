@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from numba import config as numba_config
@@ -35,11 +35,17 @@ def end_with_parent(process):
 threading.Thread(target=end_with_parent, args=[int(sys.argv[1])], daemon=True).start()
 sys.path[:] = sys.argv[3:]
 work = importlib.import_module(sys.argv[2]).STEPS
-while step := os.read(0, 1):
-    with contextlib.suppress(Exception):
-        work[step[0]]()
-        os.write(1, step)
+while steps := os.read(0, len(work)):
+    for step in steps.rstrip(bytes([255])):
+        with contextlib.suppress(Exception):
+            work[step]()
+            os.write(1, bytes([step]))
 """
+
+
+PLAIN_ERRORS = {"NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
+"""Environment of processes that compile: where colorama is installed, numba colours texts that nobody sees, a thirtieth
+of all compiling."""
 
 
 def fill_cache(
@@ -48,13 +54,15 @@ def fill_cache(
     processes: int,
     progress: Callable[[int], object] | None = None,
     chosen: Sequence[int] | None = None,
+    related: Sequence[Sequence[int]] | None = None,
 ) -> Sequence[int]:
     """Call the functions in ``STEPS`` of the engine's `module`, one at a time in each of so many `processes`.
 
     Returns the indices of those that succeeded: none if the cache is already complete or cannot be written. Other
     processes that call this meanwhile wait for the one that compiles. What a step failed to store (it was killed, the
     disk is full) is compiled by its first caller. shares: relative duration of each step. progress: called with the
-    share of each step that ended. chosen: the indices of the steps to call; all by default.
+    share of each step that ended. chosen: the indices of the steps to call; all by default. related: indices of steps
+    that one process calls; each by itself by default.
     """
     folder, seed_folder = cache_folder(), seed()
     if seed_folder is not None and source_digest(module) is not None and not has_all(seed_folder, module):
@@ -65,12 +73,13 @@ def fill_cache(
     if is_full(module):
         return ()
     steps = range(len(shares)) if chosen is None else chosen
+    parts = [[step for step in part if step in steps] for part in related or zip(steps)]
     with contextlib.suppress(OSError):
         own = folder / digest
         own.mkdir(mode=0o755, parents=True, exist_ok=True)
         with _locked(own / "lock"):
             if not is_full(module):
-                done = _run(module, {step: shares[step] for step in steps}, processes, progress)
+                done = _run(module, [part for part in parts if part], shares, processes, progress)
                 if len(done) == len(shares):
                     note_full(module)
                 return done
@@ -110,26 +119,33 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _run(
-    module: str, shares: Mapping[int, int], processes: int, progress: Callable[[int], object] | None
+    module: str,
+    parts: Sequence[Sequence[int]],
+    shares: Sequence[int],
+    processes: int,
+    progress: Callable[[int], object] | None,
 ) -> Sequence[int]:
-    """Return the steps that succeeded; processes take them from one pipe, and report to another."""
-    log.info("compiling all kernels, once for these sources: %d parts, %d processes", len(shares), processes)
+    """Return the steps that succeeded; processes take lists of them, filled up with 255, from one pipe, and report each
+    to another."""
+    log.info("compiling all kernels, once for these sources: %d parts, %d processes", len(parts), processes)
     done: list[int] = []
+    total = sum(shares[step] for part in parts for step in part)
     begin, running = time.perf_counter(), []
     (steps, left), (ended, said) = os.pipe(), os.pipe()
-    os.write(left, bytes(shares))
+    os.write(left, b"".join(bytes(part).ljust(len(shares), bytes([255])) for part in parts))
     os.close(left)
     try:
         try:
             command = [sys.executable, "-c", _COMPILE, str(os.getpid()), module, *sys.path]
-            for _ in range(min(processes, len(shares))):
-                running.append(subprocess.Popen(command, stdin=steps, stdout=said, stderr=subprocess.DEVNULL))
+            around, lost = {**os.environ, **PLAIN_ERRORS}, subprocess.DEVNULL
+            for _ in range(min(processes, len(parts))):
+                running.append(subprocess.Popen(command, stdin=steps, stdout=said, stderr=lost, env=around))
         finally:
             os.close(steps)
             os.close(said)
         while step := os.read(ended, 1):
             done.append(step[0])
-            seconds, part = time.perf_counter() - begin, sum(shares[each] for each in done) / sum(shares.values())
+            seconds, part = time.perf_counter() - begin, sum(shares[each] for each in done) / total
             rest = seconds * (1 - part) / part
             log.info("compiled %.0f %% of all kernels in %.0f s; some %.0f s are left", 100 * part, seconds, rest)
             if progress is not None:

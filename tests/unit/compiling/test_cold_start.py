@@ -40,10 +40,10 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def fill(place: Path, third: str = "say(2)", **more: str) -> subprocess.Popen[bytes]:
+def fill(place: Path, third: str = "say(2)", code: str = FILL, **more: str) -> subprocess.Popen[bytes]:
     (place / "engine" / "work.py").write_text(WORK.format(place=str(place / "done"), third=third))
     variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache"), "ENGINE_CACHE_SEED": "", **more}
-    command = [sys.executable, "-X", "dev", "-c", FILL]  # says of every file that is left open
+    command = [sys.executable, "-X", "dev", "-c", code]  # says of every file that is left open
     return subprocess.Popen(command, env={**os.environ, **variables}, cwd=place, stderr=subprocess.PIPE)
 
 
@@ -63,6 +63,15 @@ def test_each_step_runs_once_in_one_of_two_processes_whoever_asks(place: Path) -
     assert end(fill(place)) == (0, b"")
     assert steps_done(place) == ["0", "1", "2"]
     assert len({file.name.partition("-")[2] for file in (place / "done").iterdir()}) <= 2
+
+
+def test_related_steps_are_called_by_one_process_in_their_order(place: Path) -> None:
+    """The first list waits for the second, which another process calls meanwhile."""
+    wait = "[say(2), [time.sleep(0.01) for time in [__import__('time')] * 6000 if not any(PLACE.glob('1-*'))]]"
+    assert end(fill(place, wait, FILL.replace("2)", "2, related=((2, 0), (1,)))"))) == (0, b"")
+    by = {file.name[0]: file for file in (place / "done").iterdir()}
+    assert by["0"].name[2:] == by["2"].name[2:] != by["1"].name[2:]
+    assert by["2"].stat().st_mtime_ns <= by["0"].stat().st_mtime_ns
 
 
 def test_a_seed_that_is_full_needs_no_step(place: Path) -> None:
