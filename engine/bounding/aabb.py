@@ -36,6 +36,27 @@ def box_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     return points.min(axis=0), points.max(axis=0)
 
 
+@kernel
+def fill_box(vertices: FloatArray, triangles: IntArray, low: FloatArray, high: FloatArray) -> float:
+    """Fill low and high (3,) with the box of the vertices of triangles (m, 3); return the square of the largest
+    distance from its centre."""
+    largest = 0.0
+    low[:], high[:] = np.inf, -np.inf
+    for turn in range(2):
+        for item in range(triangles.shape[0]):
+            for corner in range(3):
+                vertex, square = triangles[item, corner], 0.0
+                for k in range(3):
+                    x = vertices[vertex, k]
+                    if turn == 0:
+                        low[k], high[k] = min(low[k], x), max(high[k], x)
+                    else:
+                        aside = x - (0.5 * low[k] + 0.5 * high[k])
+                        square += aside * aside
+                largest = max(largest, square)
+    return largest
+
+
 def corners_of_box(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return the ``(2 ** dimension, dimension)`` corners of a box; bit k of a row's number says high (1) or low (0) on
     axis k."""

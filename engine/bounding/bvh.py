@@ -134,13 +134,14 @@ def build_stretched_bvh(boxes: FloatArray) -> tuple[Bvh, FloatArray, FloatArray]
 def build_balanced_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree of `build_bvh` over boxes (n_items, 6), which are overwritten, with runs split as if all axes had
     similar extents (`_stretch`): by the surface area of a long thin mesh, nodes would be wide across its short axes."""
-    tree, origin, scale = build_stretched_bvh(boxes)
-    if (scale == tree.scale).all():
+    _stretch(boxes, stretch := np.ones(3))
+    tree = build_bvh(boxes)
+    if stretch.tolist() == [1.0, 1.0, 1.0]:
         return tree
-    narrowed = tree.boxes * np.tile(scale / tree.scale, 2).astype(np.float32)[:, None]
+    narrowed = tree.boxes * np.tile(1.0 / stretch, 2).astype(np.float32)[:, None]
     np.maximum(narrowed[:, 3:], np.float32(LEAST), out=narrowed[:, 3:])
     narrowed = np.where(tree.child[:, None] == EMPTY, tree.boxes, narrowed)
-    return Bvh(cache_aligned(narrowed), tree.child, origin, tree.scale)
+    return Bvh(cache_aligned(narrowed), tree.child, read_only(tree.origin / stretch), tree.scale)
 
 
 @kernel

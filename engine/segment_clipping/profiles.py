@@ -366,13 +366,21 @@ def _near(boundary: Outline | Mesh, p: Point, q: Point, are_floats: bool, budget
     """Return the indices of the elements of a boundary that a segment p q of rationals may meet. are_floats: whether
     all its coordinates are."""
     if are_floats or isinstance(boundary, Mesh):
-        rounded = np.array([[[float(x) if -LARGEST <= x <= LARGEST else np.inf for x in end] for end in (p, q)]])
+        rounded = np.array([[[_nearest(x) for x in end] for end in (p, q)]])
         size = float(np.abs(rounded).max())
         if (are_floats or size < _FAR) and (rounded[0, 0] != rounded[0, 1]).any():
             blur = 0.0 if are_floats else 2.0**-52 * size + 2.0**-1000
             near, kinds, _ = contacts_with(rounded, boundary, budget, blur)
             return near[kinds & np.uint8(Bit.CEASES) == 0]  # each element once
     return near_boxes(boundary.elements, p, q)
+
+
+def _nearest(x: Number) -> float:
+    """Return the double nearest to a number, infinity beyond the largest."""
+    try:
+        return float(x)
+    except OverflowError:
+        return np.inf
 
 
 def near_boxes(elements: FloatArray, p: Point, q: Point) -> Any:

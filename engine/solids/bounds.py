@@ -8,9 +8,10 @@ from typing import Any, Literal, TypeAlias, Unpack, overload
 
 import numpy as np
 
-from engine.bounding.aabb import box_of_points, corners_of_box
+from engine.bounding.aabb import box_of_points, corners_of_box, fill_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
+from engine.compiling.jit import entry_of
 from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
 from engine.predicates.rational import nearest_float
 from engine.running.budget import Budget, Cancel
@@ -23,7 +24,7 @@ from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, Sphere, Triangle
 from engine.solids.registry import Box, refused, row_of, unbounded
 from engine.solids.shapes import read_argument
-from engine.types import Accuracy, FloatArray
+from engine.types import Accuracy, FloatArray, read_only
 
 Check: TypeAlias = Callable[[], object] | None
 
@@ -213,11 +214,15 @@ def triangle_box(solid: Triangle, check: Check) -> Box:
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:
     """Return (low, high, reach): the box of the vertices in use, and an upper bound on their distance from its centre.
     The square underflows for distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings."""
-    points = vertices_in_use(body)
-    low, high = box_of_points(points)
     with np.errstate(all="ignore"):
-        aside = points - (0.5 * low + 0.5 * high)
-        reach = float(np.sqrt((aside * aside).sum(axis=1).max())) * (1.0 + 2.0**-40) + 2.0**-500
+        if isinstance(body, Mesh):
+            low, high = np.empty(3), np.empty(3)
+            reach = entry_of(fill_box)(read_only(body.vertices), read_only(body.triangles), low, high)
+        else:
+            low, high = box_of_points(body.vertices)
+            aside = body.vertices - (0.5 * low + 0.5 * high)
+            reach = (aside * aside).sum(axis=1).max()
+    reach = float(np.sqrt(reach)) * (1.0 + 2.0**-40) + 2.0**-500
     return low, high, reach
 
 

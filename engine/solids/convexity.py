@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.compiling.jit import entry_of, inline, kernel
+from engine.compiling.jit import allocating_kernel, entry_of, inline, kernel
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
 from engine.solids.mesh import Polyhedron
@@ -50,15 +50,7 @@ def _certified(solid: Polyhedron) -> Convexity | None:
         center, side = _center_and_side(vertices, triangles)
         if side == 0:
             return None
-        starts, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
-        edges, turned = starts * len(vertices) + ends, ends * len(vertices) + starts
-        order, turned_order = edges.argsort(), turned.argsort()
-        edges = edges[order]
-        if (edges[1:] == edges[:-1]).any() or (edges != turned[turned_order]).any():
-            return None
-        others = np.empty_like(order)
-        others[turned_order] = order
-        is_convex = entry_of(_is_convex)(vertices, triangles, others, center, side)
+        is_convex = entry_of(_is_convex)(vertices, triangles, center, side)
     return Convexity(center, side < 0) if is_convex else None
 
 
@@ -100,18 +92,44 @@ def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) 
     return side
 
 
-@kernel
-def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, center: FloatArray, side: int) -> bool:
-    """Return whether the mesh is locally convex at every edge, and some half-line from the centre crosses one triangle.
-    others (3 m,): the edge that starts at corner k of triangle i has number 3 i + k; by edge the number of the opposite
-    one. side: result of `_common_side`."""
-    for corner in range(others.shape[0]):
-        other = others[corner]
-        a, b, c = corners_of(vertices, triangles, corner // 3)
-        sign = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > corner else 0
+@allocating_kernel
+def _is_convex(vertices: FloatArray, triangles: IntArray, center: FloatArray, side: int) -> bool:
+    """Return whether the mesh is locally convex at every edge, each of which is used once in either direction, and some
+    half-line from the centre crosses one triangle. side: result of `_common_side`. The edge that starts at corner k of
+    triangle i has number 3 i + k; a hash table lists them."""
+    n_slots = 8
+    while n_slots < 6 * triangles.shape[0]:
+        n_slots *= 2
+    slots = np.full(n_slots, -1, np.int64)
+    for edge in range(3 * triangles.shape[0]):
+        slot = _slot_of_edge(slots, triangles, triangles[edge // 3, edge % 3], triangles[edge // 3, (edge + 1) % 3])
+        if slots[slot] >= 0:
+            return False
+        slots[slot] = edge
+    for edge in range(3 * triangles.shape[0]):
+        slot = _slot_of_edge(slots, triangles, triangles[edge // 3, (edge + 1) % 3], triangles[edge // 3, edge % 3])
+        other = slots[slot]
+        if other < 0:
+            return False
+        a, b, c = corners_of(vertices, triangles, edge // 3)
+        sign = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > edge else 0
         if sign != 0 and sign != side:
             return False
     return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
+
+
+@inline
+def _slot_of_edge(slots: IntArray, triangles: IntArray, start: int, end: int) -> int:
+    """Return the slot of the edge from one vertex to another in an open-addressing hash table of edges, -1 in free
+    slots; the free slot for it if it is not there."""
+    last = slots.shape[0] - 1
+    place = ((start * 73856093) ^ (end * 19349663)) & last
+    while slots[place] >= 0:  # bound: a quarter of the places are free
+        edge = slots[place]
+        if triangles[edge // 3, edge % 3] == start and triangles[edge // 3, (edge + 1) % 3] == end:
+            break
+        place = (place + 1) & last
+    return place
 
 
 @kernel

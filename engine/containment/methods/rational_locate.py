@@ -141,15 +141,16 @@ def _uncertain_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[In
 def in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
     """Return the location of a rational point in a polyhedron: INSIDE 1, BOUNDARY 0, OUTSIDE -1."""
     triangles, odd = _uncertain_triangles(point, solid)
-    for turn, triangle in enumerate(triangles):
-        if turn % _CHECK_EVERY == 0:
-            check()
-        corners = solid.vertices[triangle].ravel().tolist()
+    for first in range(0, len(triangles), _CHECK_EVERY):
+        check()
+        corners = solid.vertices[triangles[first : first + _CHECK_EVERY]].ravel().tolist()
         v = scaled_integers((*corners, *point))
-        met = _cross_upwards(tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:12]))
-        if met == ON_FACE:
-            return BOUNDARY
-        odd ^= met == CROSSED
+        *vertices, q = zip(v[::3], v[1::3], v[2::3])
+        for a, b, c in zip(vertices[::3], vertices[1::3], vertices[2::3]):
+            met = _cross_upwards(a, b, c, q)
+            if met == ON_FACE:
+                return BOUNDARY
+            odd ^= met == CROSSED
     return INSIDE if odd else OUTSIDE
 
 

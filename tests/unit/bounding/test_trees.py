@@ -7,7 +7,7 @@ import pytest
 
 from engine import Surface
 from engine.bounding import bvh
-from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh, build_stretched_bvh
+from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_balanced_bvh, build_bvh, build_stretched_bvh
 from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
 from engine.errors import CancelledError
 from engine.lanes.boxes import EMPTY
@@ -54,6 +54,14 @@ def test_every_item_once(n_items: int, scale: float) -> None:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         boxes = np.clip(random_boxes(n_items, scale, n_items), -1.7e308, 1.7e308)
         check_tree(boxes, build_bvh(boxes))
+
+
+@pytest.mark.parametrize("stretch", [(1, 1, 1), (1e5, 1, 1), (1, 1e-7, 1e3), (1, 0, 1e-40), (1e200, 1, 1e-200)])
+def test_every_item_once_in_a_balanced_tree(stretch: tuple[float, float, float]) -> None:
+    boxes = random_boxes(400, 1.0, 7) * np.tile(stretch, 2)
+    tree = build_balanced_bvh(boxes.copy())
+    check_tree(boxes, tree)
+    assert tree.scale == build_bvh(boxes).scale
 
 
 def test_equal_centres_and_geometric_sizes_stay_shallow() -> None:

@@ -112,6 +112,22 @@ def test_is_what_clip_segments_says_of_one_body() -> None:
                     np.testing.assert_array_equal(getattr(found, name), getattr(alone, name), solid.type)
 
 
+@pytest.mark.parametrize("scale", [1.0, 2.0**-1070, 2.0**900])
+def test_posed_vertices_that_are_doubles_need_no_rationals(scale: float) -> None:
+    rng, turn = np.random.default_rng(11), [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
+    body = Polyhedron(np.multiply(OCTAHEDRON, scale), FACES)
+    segments = rng.integers(-2, 3, (150, 2, 3)) * scale  # along edges, in faces, through vertices
+    for pose in (Pose(np.eye(3), [scale, 0, -scale]), Pose(turn, [-scale, scale, 0])):
+        found, report = Scene([body], [pose]).clip_segments(segments, report=True)
+        assert_exact(found, segments, expected_pieces(segments, [body], [pose]))
+        moved = Polyhedron(body.vertices @ pose.rotation.T + pose.translation, FACES)
+        np.testing.assert_array_equal(found.faces, clip_segments(segments, moved).faces)
+        assert report.n_rational == 0 or scale != 1.0
+    far = Pose(np.eye(3), [2.0**60 * scale, 0, scale / 3])  # vertices that are no doubles there
+    near = segments + np.array([0, 0, scale / 3])
+    assert_exact(Scene([body], [far]).clip_segments(near), near, expected_pieces(near, [body], [far]))
+
+
 def test_ends_that_round_alike_are_put_in_exact_order() -> None:
     """The faces of three boxes stand at 1/3, just before it and just behind: in doubles along the segment all alike."""
     third = 1 / 3  # below 1/3 exactly
