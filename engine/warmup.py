@@ -304,7 +304,8 @@ def _warm_bounds() -> None:
         for solid in _regions(dimension):
             with contextlib.suppress(Exception):  # unbounded ones are refused
                 bounds(solid)
-    for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), _cube(5.0)):
+    cube = _cube(5.0)
+    for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), cube, Surface(cube.vertices, cube.triangles)):
         clearance(body, Sphere([3, 0, 0], 1))
     clearance_poses(_cube(), _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
     collide_scene([Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1)], gap=2.0)
