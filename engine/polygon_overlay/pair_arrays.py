@@ -11,7 +11,6 @@ from engine.compiling.jit import entry_of
 from engine.errors import RingTooShortError
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import boxes_of_runs, largest_counts
-from engine.polygon_overlay.compiled.polygon_fields import LAYOUT, copy_rings, count_rings
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.joining import join_columns, join_sizes
@@ -220,22 +219,19 @@ def concatenate_polygons(parts: Sequence[PolygonArrays]) -> PolygonArrays:
 
 
 def polygon_arrays_of(polygons: Sequence[Polygon], first: int = 0, last: int | None = None) -> PolygonArrays:
-    """Return polygons first .. last - 1, at least one, by default to the end, as flat arrays."""
-    every = tuple(polygons)  # another thread may change a list
-    n = (len(every) if last is None else min(last, len(every))) - first
-    if n == 1:
-        only = every[first]
-        return PolygonArrays(only.vertices, only.ring_offsets, one_polygon(only.n_rings))
-    if LAYOUT is None:
-        some = every[first : first + n]
-        sizes = [np.diff(each.ring_offsets) for each in some]
-        vertices = read_only(np.concatenate([each.vertices for each in some]))
-        return PolygonArrays(vertices, summed(np.concatenate(sizes)), summed([len(each) for each in sizes]))
-    offsets = np.empty(n + 1, np.int64)
-    vertices = np.empty((entry_of(count_rings)(id(every), LAYOUT, first, offsets), 2))
-    rings = np.empty(offsets[-1] + 1, np.int64)
-    entry_of(copy_rings)(id(every), LAYOUT, first, offsets, vertices, rings)
-    return PolygonArrays(read_only(vertices), read_only(rings), read_only(offsets))
+    """Return polygons first .. last - 1, by default to the end, as flat arrays, joined as bytes: numpy takes three
+    times as long to concatenate small ones."""
+    some = polygons[first:last]
+    if len(some) == 1:
+        return PolygonArrays(some[0].vertices, some[0].ring_offsets, one_polygon(some[0].n_rings))
+    vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in some])))
+    offsets = np.frombuffer(b"".join(cast("list[bytes]", [each.ring_offsets for each in some])), np.int64)
+    if len(offsets) == 2 * len(some) and not offsets[::2].any():  # one ring each: a small batch waits for this
+        return PolygonArrays(vertices.reshape(-1, 2), summed(offsets[1::2]), read_only(np.arange(len(some) + 1)))
+    starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
+    ends = np.append(starts[1:], len(offsets)) - 1
+    sizes = np.delete(offsets[1:] - offsets[:-1], ends[:-1])
+    return PolygonArrays(vertices.reshape(-1, 2), summed(sizes), summed(ends - starts))
 
 
 class PolygonSelection(Sequence[Polygon]):
