@@ -17,7 +17,8 @@ from tempfile import TemporaryDirectory
 from engine.compiling.cold_start import PLAIN_ERRORS
 from engine.compiling.kernel_cache import cache_folder, check_owner, seal, seed
 from engine.running.parallel import Progress
-from engine.warmup import GROUPS, warm
+from engine.warm_groups import GROUPS, call_group
+from engine.warmup import warm
 
 Options = argparse.Namespace
 
@@ -64,7 +65,7 @@ def _compile_groups(folder: Path, surroundings: Mapping[str, str], options: Opti
     does not depend on who is faster."""
     if not options.quiet:
         print(f"compiling all kernels: a few minutes on {min(options.processes, len(GROUPS))} core(s)", file=sys.stderr)
-    code = f"import logging, exact_geometry as e; logging.disable(); from {warm.__module__} import call_group"
+    code = f"import logging, exact_geometry as e; logging.disable(); from {call_group.__module__} import call_group"
     with TemporaryDirectory() as temporary, ThreadPoolExecutor(options.processes) as pool:
         parts = [Path(temporary) / str(group) for group in range(len(GROUPS))]
 

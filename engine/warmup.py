@@ -7,7 +7,6 @@ test compares the kernels reached here with those the engine has.
 from __future__ import annotations
 
 import contextlib
-import os
 import threading
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -47,7 +46,6 @@ from engine.solid_cutting.section import section
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
 from engine.solids.checks import as_points, shown
-from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit
 from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
@@ -111,7 +109,7 @@ def warm(
             if progress is not None:
                 progress(100 * ended // total - before)
 
-        filled = fill_cache(__name__, SHARES, processes, report, chosen, RELATED)
+        filled = fill_cache(__name__, SHARES, processes, report, chosen, RELATED if processes < len(RELATED) else None)
         for index in chosen:
             STEPS[index]()
             if index not in filled:
@@ -139,7 +137,7 @@ def _cube(at: float = 0.0) -> Polyhedron:
     return Polyhedron(corners, faces)
 
 
-def _regions(dimension: int) -> list[Solid]:
+def regions_of(dimension: int) -> list[Solid]:
     """Return one solid of each type of a dimension, without types that only some operations take."""
     first = np.eye(dimension)[0]
     simple: list[Solid] = [
@@ -160,7 +158,7 @@ def _locate(dimension: int) -> None:
     points = np.linspace(-0.5, 1.5, 12 * dimension).reshape(-1, dimension)
     corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[:3]
     terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
-    solids = [*_regions(dimension), Triangle(corners), terms]
+    solids = [*regions_of(dimension), Triangle(corners), terms]
     poses: list[Pose | None] = [Pose(np.eye(dimension), np.full(dimension, 0.25))] * len(solids)
     for solid in solids:
         locate(points, solid)
@@ -183,16 +181,26 @@ def _warm_cells() -> None:
 
 
 def _warm_poses() -> None:
-    turns, moves = np.broadcast_to(np.eye(3), (3, 3, 3)), np.array([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]])
-    bodies = _bodies()
-    for first in bodies:
-        collide_poses(first, bodies[0], turns, moves, witnesses=True)
-    collide_poses(bodies[0], _cube(0.5), np.repeat(turns, 12, axis=0), np.repeat(moves, 12, axis=0))  # eight at a time
+    for first in _bodies():
+        _collide_under_poses(first)
+    turns, moves = np.broadcast_to(np.eye(3), (36, 3, 3)), np.repeat([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]], 12, axis=0)
+    collide_poses(_cube(), _cube(0.5), turns, moves)  # eight at a time
+
+
+def _collide_under_poses(first: Solid) -> None:
+    moves = np.array([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]])
+    collide_poses(first, _cube(), np.broadcast_to(np.eye(3), (3, 3, 3)), moves, witnesses=True)
+
+
+def _warm_forms() -> None:
+    for first in _bodies():
+        for other in (HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
+            collide(first, other)
 
 
 def _warm_collision() -> None:
     for first in _bodies():
-        for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
+        for other in (_cube(1.0), _cube(0.5)):
             collide(first, other)
     cube = _cube()
     collide(Polyhedron(cube.vertices, np.concatenate([cube.triangles] * 2)), _cube(0.5))  # faces that cancel: regions
@@ -201,6 +209,9 @@ def _warm_collision() -> None:
 def _warm_scenes() -> None:
     collide_scene(_bodies())
     Scene(_bodies()).collide(moved=[0])
+
+
+def _warm_flat_bodies() -> None:
     for scene in [Scene([Sphere([0, 0, 0], 1)])] * 2:  # a question after the first
         scene.locate([[0.25, 0, 0]])
     many = [Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)]
@@ -216,17 +227,28 @@ def _warm_scenes() -> None:
         collide_triangles(corners, corners + 0.25)
 
 
-def _warm_scene_clipping() -> None:
-    segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
-    Scene([_cube()], [Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])]).hits(segments)
-    turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
-    for dimension in (2, 3):
-        some = [*_regions(dimension), *_bodies()[1:2] * (dimension == 3)]
-        pose = turned if dimension == 3 else Pose([[0.6, -0.8], [0.8, 0.6]], [0.25, 0])
-        scene = Scene(some * 2, [None] * len(some) + [pose] * len(some))
-        for keep in ("all", "first", "any"):
-            scene.clip_segments(np.array(segments)[:, :, :dimension], keep=keep)
-        scene.clip_segments(np.tile(np.array(segments)[:, :, :dimension], (10_000, 1, 1)), keep="any")  # put in order
+_LINES = np.array([[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]])
+
+
+def _warm_hits() -> None:
+    Scene([_cube()], [Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])]).hits(_LINES)
+    hits([[[-1.0, 0.5, 0.25], [2.0, 0.5, 0.5]]], _cube())
+
+
+def _warm_scene_clipping_2d() -> None:
+    _clip_scene(regions_of(2), Pose([[0.6, -0.8], [0.8, 0.6]], [0.25, 0]))
+
+
+def _warm_scene_clipping_3d() -> None:
+    _clip_scene([*regions_of(3), *_bodies()[1:2]], Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0]))
+
+
+def _clip_scene(some: list[Solid], pose: Pose) -> None:
+    segments = _LINES[:, :, : pose.dimension]
+    scene = Scene(some * 2, [None] * len(some) + [pose] * len(some))
+    for keep in ("all", "first", "any"):
+        scene.clip_segments(segments, keep=keep)
+    scene.clip_segments(np.tile(segments, (10_000, 1, 1)), keep="any")  # put in order
 
 
 def _bodies() -> list[Solid]:
@@ -244,17 +266,21 @@ def _warm_clipping_2d() -> None:
 def _warm_clipping_3d() -> None:
     _clip(3)
     clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
-    hits([[[-1.0, 0.5, 0.25], [2.0, 0.5, 0.5]]], _cube())
 
 
 def _clip(dimension: int) -> None:
     segments = np.linspace(-1.0, 2.0, 8 * dimension).reshape(4, 2, dimension)
-    contour = np.array([[-1.0, -1.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]])[:, :dimension]
-    for region in _regions(dimension):
+    for region in regions_of(dimension):
         clip_segments(segments, region)
         clip_lines(segments, region)
-        if region.type not in ("sphere", "polygon"):
-            clip_polygons([[contour]], region)
+
+
+def _warm_clipping_polygons() -> None:
+    for dimension in (2, 3):
+        contour = np.array([[-1.0, -1.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]])[:, :dimension]
+        for region in regions_of(dimension):
+            if region.type not in ("sphere", "polygon"):
+                clip_polygons([[contour]], region)
 
 
 def _warm_overlay() -> None:
@@ -301,15 +327,19 @@ def _warm_distances() -> None:
 
 def _warm_bounds() -> None:
     for dimension in (2, 3):
-        for solid in _regions(dimension):
+        for solid in regions_of(dimension):
             with contextlib.suppress(Exception):  # unbounded ones are refused
                 bounds(solid)
     cube = _cube(5.0)
     for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), cube, Surface(cube.vertices, cube.triangles)):
         clearance(body, Sphere([3, 0, 0], 1))
-    clearance_poses(_cube(), _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
     collide_scene([Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1)], gap=2.0)
     orientations(*np.zeros((4, 1, 3)))  # of meshes that are inspected
+
+
+def _warm_clearances() -> None:
+    _collide_under_poses(_cube())  # order: its kernel takes the longest; others are stored meanwhile
+    clearance_poses(_cube(), _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
 
 
 def _warm_cutting() -> None:
@@ -341,82 +371,54 @@ def _notched() -> tuple[Any, Any]:
 STEPS = (
     _warm_overlay,
     _warm_poses,
-    _warm_scene_clipping,
-    _warm_clipping_2d,
-    _warm_collision,
+    _warm_scene_clipping_2d,
     _warm_clipping_3d,
-    _warm_scenes,
-    _warm_bounds,
     _warm_distances,
+    _warm_flat_bodies,
     _warm_cutting,
+    _warm_scene_clipping_3d,
+    _warm_bounds,
     _warm_containment,
+    _warm_clipping_polygons,
+    _warm_clipping_2d,
+    _warm_scenes,
+    _warm_clearances,
+    _warm_collision,
+    _warm_hits,
+    _warm_forms,
     _warm_overlay_rest,
     _warm_cells,
 )
-"""Parts of the work; a kernel that several need is compiled by the first, or in several processes."""
-SHARES = (14, 16, 20, 4, 3, 6, 10, 6, 6, 5, 2, 6, 2)
-"""Duration of each of `STEPS`, in the order of `GROUPS`, in per cent."""
-RELATED = ((1, 4, 6, 7), (0, 11), (2, 3, 5), (8, 9, 10, 12))
-"""Indices of steps that compile much the same, long ones first: one process calls them, since what two processes need
-both compile."""
-GROUPS = (RELATED[0] + RELATED[3], RELATED[1] + RELATED[2])
-"""Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
-decides symbols and inlining. What both compile is that of the first."""
+"""Parts of the work; a kernel that several need is compiled by the first, or in several processes.
+
+*order*: long ones first, those last that need the longest kernel of all (poses of meshes), which is stored when few
+processes reach them; many begin with them. Seconds of CPU, each alone with an empty cache: 29, 36, 28, 25, 24, 24, 23,
+23, 23, 20, 18, 17, 37, 38, 35, 15, 16, 6, 4.
+"""
+SHARES = (14, 16, 12, 5, 6, 7, 5, 8, 4, 2, 2, 3, 3, 2, 2, 2, 1, 4, 2)
+"""Duration of each of `STEPS`, in the order of `RELATED`, in per cent."""
+RELATED = ((1, 16, 14, 12, 5, 13, 8), (0, 17), (2, 7, 11, 3, 10, 15), (4, 6, 9, 18))
+"""Indices of steps that compile much the same, long ones first. One of few processes calls them, since what two need
+both compile; of more than there are such lists each calls the next step."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)
+_COLLIDING, _OVERLAYING = (_warm_collision, _warm_forms), (_warm_overlay, _warm_overlay_rest)
+_IN_SCENES = (_warm_scenes, _warm_flat_bodies)
 OPERATIONS = {
     "locate": _LOCATING,
     "contains": _LOCATING,
-    "locate_scene": (*_LOCATING, _warm_scenes),
-    "collide": (_warm_collision, _warm_scenes),
-    "collide_poses": (_warm_poses, _warm_collision),
-    "collide_scene": (_warm_collision, _warm_scenes),
-    "clearance": (_warm_scenes, _warm_bounds),
+    "locate_scene": (*_LOCATING, *_IN_SCENES),
+    "collide": (*_COLLIDING, *_IN_SCENES),
+    "collide_poses": (_warm_poses, *_COLLIDING),
+    "collide_scene": (*_COLLIDING, *_IN_SCENES),
+    "clearance": (_warm_bounds, _warm_clearances, *_IN_SCENES),
     "distances": (_warm_distances,),
     "clip_segments": _CLIPPING,
     "clip_lines": _CLIPPING,
-    "hits": (_warm_clipping_3d,),
-    "clip_polygons": _CLIPPING,
-    "Scene": (*_LOCATING, _warm_scenes, _warm_scene_clipping),
-    "overlay": (_warm_overlay, _warm_overlay_rest),
-    "overlay_batch": (_warm_overlay, _warm_overlay_rest),
-    "union_all": (_warm_overlay, _warm_overlay_rest),
+    "hits": (_warm_hits,),
+    "clip_polygons": (_warm_clipping_polygons,),
+    "Scene": (*_LOCATING, *_IN_SCENES, _warm_hits, _warm_scene_clipping_2d, _warm_scene_clipping_3d),
+    **dict.fromkeys(("overlay", "overlay_batch", "union_all"), _OVERLAYING),
     "bounds": (_warm_bounds,),
     **dict.fromkeys(("volume", "area", "centroid", "section", "cut", "overlap_volume", "iou"), (_warm_cutting,)),
 }
 """The steps of each operation."""
-
-
-def call_group(index: int) -> None:
-    """Call the steps of one of `GROUPS`, and compile what only `compare` asks; on one core, so that no other thread
-    compiles: the order in which functions are compiled is part of their names."""
-    if hasattr(os, "sched_setaffinity"):
-        cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[index % len(cores)]})
-    with contextlib.suppress(ImportError, AttributeError):  # without it kernels are as right
-        from engine.compiling.compilers import forget_paths
-
-        forget_paths()
-    for step in GROUPS[index]:
-        STEPS[step]()
-    if index == len(GROUPS) - 1:
-        warm_textbook()
-
-
-def warm_textbook() -> None:
-    """Ask every textbook method that `compare` offers; not a step, since hardly anybody asks more than one."""
-    from engine.textbook import methods
-
-    for dimension in (2, 3):
-        points = as_points(np.linspace(-0.5, 1.5, 6 * dimension).reshape(-1, dimension), dimension)
-        corners = np.eye(3)[:, :dimension]
-        terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
-        for solid in (*_regions(dimension), Triangle(corners), terms, Csg("union", _regions(dimension)[:3])):
-            questions: list[tuple[methods.Methods, tuple[Any, ...]]] = [
-                (methods.of_points(solid), (points,)),
-                (methods.of_segments(solid), (points.reshape(3, 2, dimension),)),
-                (methods.of_polygons(solid), (points.reshape(2, 3, dimension),)),
-                (methods.of_pairs(solid, solid), ()),
-            ]
-            for offered, arguments in questions:
-                for ask, _ in offered.values():
-                    ask(*arguments)
