@@ -64,7 +64,7 @@ _BLOCKS_GROW: Final = 10_000
 _MOST: Final = 0.5
 """Largest fraction of edges that may be active for a reduction to pay."""
 _BY_CONTACT: Final = 300
-_BY_VERTEX: Final = 200
+BY_VERTEX: Final = 200
 """Upper bounds in bytes of scratch and output."""
 _FEW_CONTACTS: Final = 1024
 
@@ -152,7 +152,7 @@ def _run_pair(
 ) -> PairResults:
     """Overlay one pair; the memory of large ones is charged to the budget first."""
     if (n_vertices := len(subject.vertices) + len(clip.vertices)) >= _MANY:
-        budget.take(_BY_VERTEX * n_vertices)
+        budget.take(BY_VERTEX * n_vertices)
     first, second = (PolygonArrays(*side, one_polygon(len(side.offsets) - 1)) for side in (subject, clip))
     return run_kernel(first, second, SELECTED_ARRAYS[operation], budget, nesting)
 

@@ -25,7 +25,7 @@ from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.implicit_rings import NO_RINGS, edges_along, one_polygon
 from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays, one_pair, places_of
-from engine.polygon_overlay.run import SELECTED_ARRAYS, run_kernel
+from engine.polygon_overlay.run import BY_VERTEX, SELECTED_ARRAYS, run_kernel
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.running.budget import Budget
 from engine.running.joining import join_columns, take_rows
@@ -87,6 +87,7 @@ def union_by_stripes(rings: RingArrays, nesting: Nesting, workers: int | None, b
     near, n_stripes = _NEAR * max(abs(rings.vertices.min()), abs(rings.vertices.max())), len(sides) - 1
     if n_stripes < 2:
         return None
+    budget.take(BY_VERTEX * n)
     made: dict[int, _Stripe | None] = {}
 
     def task(first: int, last: int) -> None:
@@ -207,7 +208,7 @@ def _join(stripes: list[_Stripe], budget: Budget, workers: int | None) -> PairRe
     if linked is None:
         return None
     after, through = linked
-
+    budget.check()
     ring, order = _cycles(after)
     cut = order[~is_whole[order]]  # runs that are joined, ring after ring
     places = places_of_runs(runs, cut)
@@ -218,7 +219,7 @@ def _join(stripes: list[_Stripe], budget: Budget, workers: int | None) -> PairRe
     if made is None:
         return None
     places, is_cut_shell = made
-
+    budget.check()
     whole = np.flatnonzero(is_whole)
     regions = _regions(runs, ring, cut, through, int(n_pieces[-1]))
     every = np.concatenate([places_of_runs(runs, whole), places])

@@ -12,6 +12,7 @@ Policy, for a rest of the batch that takes T seconds on one thread:
 | threads | sqrt(T / 100 us), at most `workers`: starting w threads takes w * 100 us, they save T - T / w |
 | the calling thread | works too; it waits only for chunks that run when no range is left |
 | longest chunk | 1.25 ms for each thread, from 2 to 20 ms: a chunk takes the interpreter lock a fixed number of times |
+| few, long items of a known time | no chunk is timed first: `pace` |
 | first chunk of each thread | 3/4 of an even share, so that few chunks remain |
 | the others | 1/1.3 of an even share of the rest, not below 1/4 of the longest or a sixth of the first share |
 | tasks in order, up to 4 threads | half an even share of the rest, at most 2 ms |
