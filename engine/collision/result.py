@@ -39,6 +39,9 @@ SWAPPED_RELATION = {_IN: _AROUND, _AROUND: _IN}
 class Witness:
     """One reason why two bodies have a common point.
 
+    Of bodies that touch it is the strongest contact, of equal ones that of the lowest faces: of all where a plane of a
+    face parts the bodies, else of some 32.
+
     Attributes
     ----------
     kind : str
