@@ -20,6 +20,7 @@ from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import scaled_back
 from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.joining import SECONDS_OF_BYTE
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
@@ -344,8 +345,9 @@ def _assemble(
     parted = [sizes[polygon_offsets[first] : polygon_offsets[end]] for first, end in zip(firsts, ends)]
     rings = summed([int(np.count_nonzero(some)) for some in parted])
     vertices = parts[0] if len(firsts) == 1 else np.empty((starts[-1], dimension))
-    contours, ring_offsets = np.zeros(rings[-1], np.int64), np.zeros(rings[-1] + 1, np.int64)
-    offsets = np.zeros(len(polygon_offsets), np.int64)
+    contours, ring_offsets = np.empty(rings[-1], np.int64), np.empty(rings[-1] + 1, np.int64)
+    offsets = np.empty(len(polygon_offsets), np.int64)
+    ring_offsets[0] = offsets[0] = 0
     is_single = len(polygon_offsets) == len(sizes) + 1  # a ring each
 
     def fill(begin: int, stop: int) -> None:
@@ -356,6 +358,7 @@ def _assemble(
             np.add(np.cumsum(parted[k][is_left], out=ends_of), starts[k], out=ends_of)
             before = ring + np.cumsum(is_left)
             offsets[firsts[k] + 1 : ends[k] + 1] = before if is_single else before[own[1:] - own[0] - 1]
+            contours[ring:end] = 0
             if not is_single:
                 number = np.arange(len(is_left)) - np.repeat(own[:-1] - own[0], np.diff(own))
                 contours[ring:end] = number[is_left]
@@ -365,5 +368,6 @@ def _assemble(
     if len(firsts) == 1:
         fill(0, 1)
     else:
-        run_chunks(fill, len(firsts), budget=budget, workers=workers, first_chunk=1)
+        pace = SECONDS_OF_BYTE * (vertices.nbytes + 3 * offsets.nbytes) / max(1, len(firsts))
+        run_chunks(fill, len(firsts), budget=budget, workers=workers, first_chunk=1, pace=pace)
     return ClippedPolygons(vertices, ring_offsets, offsets, contours, *flags)

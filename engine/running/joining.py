@@ -13,6 +13,8 @@ from engine.running.parallel import run_chunks
 
 _FEW_BYTES: Final = 1 << 22
 """Size of arrays up to which one thread copies them."""
+SECONDS_OF_BYTE: Final = 3e-10
+"""Time in which a byte of fresh memory is written."""
 
 
 def join_columns(
@@ -43,7 +45,8 @@ def join_columns(
                 n = column[part].shape[axis]
                 into[each[part] - n : each[part]] = np.moveaxis(column[part], axis, 0)
 
-    run_chunks(copy, len(parts), budget=budget, first_chunk=1, workers=workers)
+    pace = SECONDS_OF_BYTE * sum(array.nbytes for array in joined) / len(parts)
+    run_chunks(copy, len(parts), budget=budget, first_chunk=1, workers=workers, pace=pace)
     return joined
 
 
@@ -64,7 +67,8 @@ def take_rows(arrays: Sequence[Any], rows: Any, budget: Budget, workers: int | N
 def join_sizes(parts: Sequence[Any], budget: Budget, workers: int | None) -> Any:
     """Return offsets (n + 1,) int64 from 0 of items whose sizes are the concatenated parts, as `join_columns`."""
     starts = [0, *accumulate(map(len, parts))]
-    offsets = np.zeros(starts[-1] + 1, np.int64)
+    offsets = np.empty(starts[-1] + 1, np.int64)
+    offsets[0] = 0
     if offsets.nbytes < _FEW_BYTES:
         np.cumsum(np.concatenate([np.zeros(0, np.int64), *parts]), out=offsets[1:])
         return offsets
@@ -75,5 +79,6 @@ def join_sizes(parts: Sequence[Any], budget: Budget, workers: int | None) -> Any
             some = offsets[starts[part] + 1 : starts[part + 1] + 1]
             np.add(np.cumsum(parts[part], out=some), before[part], out=some)
 
-    run_chunks(fill, len(parts), budget=budget, first_chunk=1, workers=workers)
+    pace = SECONDS_OF_BYTE * offsets.nbytes / len(parts)
+    run_chunks(fill, len(parts), budget=budget, first_chunk=1, workers=workers, pace=pace)
     return offsets

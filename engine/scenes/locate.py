@@ -22,11 +22,12 @@ from engine.containment.methods.filters import in_space
 from engine.containment.methods.rational_locate import is_located
 from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
-from engine.running.joining import join_columns, join_sizes
+from engine.running.joining import join_columns
 from engine.running.parallel import Progress, run_chunks
 from engine.scenes.location_tables import LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.placements import Placements
+from engine.solids.checks import check_finite
 from engine.solids.mesh import Polyhedron
 from engine.solids.ragged import Ragged
 from engine.solids.registry import BodyKind, row_of
@@ -161,9 +162,11 @@ _NO_KEYS: Final = np.zeros(0, np.int8), np.zeros(0, np.int64)
 def locate_all(
     points: FloatArray, scene: Placements, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
-    """Return the bodies that contain each of some checked points, and the accuracy report."""
+    """Return the bodies that contain each of some points, and the accuracy report. Raises: as `check_finite`."""
     budget.check()
     n, n_bodies, parts = len(points), len(scene.base.solids), dict[int, tuple[Any, ...]]()
+    if n <= _FEW_POINTS or not n_bodies:
+        check_finite(points, ("points",))
     if not n_bodies:
         none = SceneLocations(np.zeros(n + 1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_))
         return none, Accuracy("exact", None, n, 0, 0, "box_grid")
@@ -172,8 +175,11 @@ def locate_all(
         if all(len(getattr(solid, "vertices", ())) <= _FEW_VERTICES for solid in scene.base.solids):
             return _locate_small_batch(points, scene, budget, progress)
     where, tables = scene.where(budget), scene.tables(budget)
+    offsets = np.zeros(n + 1, np.int64)
 
     def task(start: int, stop: int) -> None:
+        if not np.isfinite(points[start:stop]).all():
+            check_finite(points, ("points",))
         done, size, blocks = start, 2 * (stop - start) + scene.n_rows, list[IntArray]()
         scratch, counted = scratch_for(scene.n_rows), np.zeros(len(tables.sizes), np.int64)
         while done < stop:  # bound: each turn locates a point, for all candidates of one have room
@@ -186,15 +192,20 @@ def locate_all(
             blocks.append(keys[:n_keys] if is_sorted else np.sort(keys[:n_keys]))
             beyond.append(n_beyond)
         keys = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        columns = np.empty(len(keys), np.int8), np.empty(len(keys), np.int64), np.zeros(stop - start, np.int64)
-        entry_of(split_keys)(keys, start, n_bodies, *columns)
+        columns, n_hits = (
+            (np.empty(len(keys), np.int8), np.empty(len(keys), np.int64)),
+            np.zeros(stop - start, np.int64),
+        )
+        entry_of(split_keys)(keys, start, n_bodies, *columns, n_hits)
+        np.cumsum(n_hits, out=offsets[start + 1 : stop + 1])
         parts[start] = columns
         query_counts.append(counted)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress)
-    each = [parts[start] for start in sorted(parts)]
-    located, bodies = join_columns([_NO_KEYS, *(part[:2] for part in each)], budget, workers)
-    offsets = join_sizes([part[2] for part in each], budget, workers)
+    starts = sorted(parts)
+    located, bodies = join_columns([_NO_KEYS, *(parts[start] for start in starts)], budget, workers)
+    for start, stop in zip(starts[1:], [*starts[2:], n]):
+        offsets[start + 1 : stop + 1] += offsets[start]
     if query_counts and len(tables.sizes):
         has_new = _build_trees(scene, np.sum(query_counts, axis=0), budget, workers)
     left = np.flatnonzero(located == UNDECIDED)

@@ -14,7 +14,7 @@ from engine.scenes.locate import SceneLocations, locate_all
 from engine.scenes.placements import Placements
 from engine.solids.accepted import PointsLike, PosesLike, SolidsLike
 from engine.solids.base import Immutable
-from engine.solids.checks import as_points, check_finite
+from engine.solids.checks import as_points
 from engine.types import Accuracy, BoolArray
 
 
@@ -59,7 +59,6 @@ class PointQueries(Immutable):
         check_options(workers, progress, report=report)
         array = as_points(points, self._dimension, must_be_finite=False)
         with Budget(deadline, cancel) as budget:
-            check_finite(array, ("points",), budget, workers)
             answer = locate_all(array, self._placements, budget, workers, progress)
         return answer if report else answer[0]
 
