@@ -57,6 +57,8 @@ _LEAST_STRETCH, _MOST_STRETCH = 5, 100
 _MOST_STRETCHED = 2.0**900
 """Boxes beyond this size, or below its reciprocal, are not stretched: coordinates could overflow or lose bits."""
 
+_MOST_UNBALANCED = 512
+"""Items up to which a tree is as good without `_stretch`."""
 _FEW_ROWS = 64
 _FEW_ITEMS, _FEW_BINS = 64, 8
 """A run of at most _FEW_ITEMS items is split with _FEW_BINS bins, because the bins would cost more than the items."""
@@ -132,8 +134,11 @@ def build_stretched_bvh(boxes: FloatArray) -> tuple[Bvh, FloatArray, FloatArray]
 
 
 def build_balanced_bvh(boxes: FloatArray) -> Bvh:
-    """Return the tree of `build_bvh` over boxes (n_items, 6), which are overwritten, with runs split as if all axes had
-    similar extents (`_stretch`): by the surface area of a long thin mesh, nodes would be wide across its short axes."""
+    """Return the tree of `build_bvh` over boxes (n_items, 6), which are overwritten; of more than _MOST_UNBALANCED with
+    runs split as if all axes had similar extents (`_stretch`): by the surface area of a long thin mesh, nodes would be
+    wide across its short axes."""
+    if len(boxes) <= _MOST_UNBALANCED:
+        return build_bvh(boxes)
     _stretch(boxes, stretch := np.ones(3))
     tree = build_bvh(boxes)
     if stretch.tolist() == [1.0, 1.0, 1.0]:
