@@ -230,15 +230,15 @@ def nearest_across(
         return np.nan
     triangles, others, best = mesh.triangles, other_mesh.triangles, Point2(0.0, 0.0)
     row[0] = row[2] = -1
-    is_found, face, their_face = False, -1, -1
+    is_known, face, their_face = False, -1, -1
     for i in range(max(1, triangles.shape[0])):
         own = _part_of(a, triangles, i, wall, gaps)
-        if own.n == 0 or (is_found and mesh.faces.size > 0 and mesh.faces[i] != face):
+        if own.n == 0 or (is_known and mesh.faces.size > 0 and mesh.faces[i] != face):
             continue
         p, q = _corner(a, triangles, i, own.k), _corner(a, triangles, i, own.l)
         corners = _seen(p, gaps), _seen(q, gaps), _seen(_corner(a, triangles, i, 2), gaps)
         for j in range(max(1, others.shape[0])):
-            if is_found and (other_mesh.faces.size == 0 or other_mesh.faces[j] >= their_face):
+            if is_known and (other_mesh.faces.size == 0 or other_mesh.faces[j] >= their_face):
                 break
             their = _part_of(b, others, j, other, gaps)
             if their.n == 0:
@@ -249,12 +249,12 @@ def nearest_across(
             if code == _UNKNOWN or their_code == _UNKNOWN:
                 return np.nan
             if code != _OUTSIDE:
-                is_found, best, row[1], row[3] = True, seen, code, their_code
+                is_known, best, row[1], row[3] = True, seen, code, their_code
                 if mesh.faces.size > 0:
                     row[0], face = i, mesh.faces[i]
                 if other_mesh.faces.size > 0:
                     row[2], their_face = j, other_mesh.faces[j]
-    return _measured(_unseen(best, gaps), wall, other, gaps, (a.round, b.round), points) if is_found else np.nan
+    return _measured(_unseen(best, gaps), wall, other, gaps, (a.round, b.round), points) if is_known else np.nan
 
 
 @called
