@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Clearance, Polyhedron, Pose, Sphere, Surface, Triangle, clearance, clearance_poses, contains
+from engine.bounding.aabb import corners_of_box
 from engine.distance.clearance import do_meet
 from engine.distance.convex_nearest import MOST_TRIANGLES, hull_of, nearest_of_hulls, nearest_of_meshes
 from engine.distance.spreads import SpreadPair, spread_pair
@@ -55,6 +56,25 @@ def pose(rng: np.random.Generator, size: float) -> Pose | None:
     return Pose(turn(random.Random(int(rng.integers(1 << 30))), 3) if rng.random() < 0.7 else np.eye(3), size * move)
 
 
+def check_crossing(found: Clearance, first: Solid, second: Solid) -> None:
+    """Points of two edges are the nearest doubles to those across from each other along the axes with gaps."""
+    assert found.points is not None
+    assert found.features is not None
+    ends = []
+    for solid, feature in zip((first, second), found.features):
+        corners = solid.vertices if isinstance(solid, (Polyhedron, Surface)) else corners_of_box(solid.min, solid.max)  # type: ignore[attr-defined]
+        ends.append([[Fraction(x) for x in corners[k].tolist()] for k in feature.indices])
+    free = [k for k in range(3) if found.points[0, k] == found.points[1, k]]
+    (p, q), (s, t) = ends
+    if len(free) == 2:
+        i, j = free
+        turn = (q[i] - p[i]) * (t[j] - s[j]) - (q[j] - p[j]) * (t[i] - s[i])
+        share = ((s[i] - p[i]) * (t[j] - s[j]) - (s[j] - p[j]) * (t[i] - s[i])) / turn
+        assert found.points[0].tolist() == [float(x + share * (y - x)) for x, y in zip(p, q)]
+        share = ((s[i] - p[i]) * (q[j] - p[j]) - (s[j] - p[j]) * (q[i] - p[i])) / turn
+        assert found.points[1].tolist() == [float(x + share * (y - x)) for x, y in zip(s, t)]
+
+
 def check_tie(found: Clearance, first: Solid, second: Solid, pair: SpreadPair, is_unposed: bool) -> None:
     """Points that the search does not give are as near, exactly, and on the lowest faces that have such."""
     every = ((i, j, 0, 0) for i in range(len(pair.meshes[0].faces)) for j in range(len(pair.meshes[1].faces)))
@@ -62,6 +82,9 @@ def check_tie(found: Clearance, first: Solid, second: Solid, pair: SpreadPair, i
     assert found.distance == least.distance()
     assert found.points is not None
     if np.array_equal(found.points, least.ends()) or isinstance(first, Sphere) or isinstance(second, Sphere):
+        return
+    if is_unposed and [feature.kind for feature in found.features or ()] == ["edge", "edge"]:
+        check_crossing(found, first, second)
         return
     square = sum((Fraction(x) - Fraction(y)) ** 2 for x, y in found.points.T.tolist())
     assert square == Fraction(least.gap.top, least.gap.bottom) / Fraction(least.scale) ** 2
@@ -95,6 +118,30 @@ def test_points_across_axes(seed: int) -> None:
     assert n_proven > 0.7 * n
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_crossed_bars(seed: int) -> None:
+    """Bars across each other: only their edges cross, at points that are no doubles."""
+    rng, n_proven = np.random.default_rng(seed), 0
+    for _ in range(60):
+        bars, axes = [], rng.permutation(3)
+        for way, height in (([1, 0], 0.0), ([0, 1], float(rng.integers(3, 9)) / 2)):
+            along = 9 * np.array(way) + rng.integers(-2, 3, 2)
+            across = np.array([-along[1], along[0]]) * float(rng.choice([0.05, 0.1, 1 / 16]))
+            middle = rng.integers(-1, 2, 2) * float(rng.choice([0.5, 0.1]))
+            ring = [middle + i * along + j * across for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            corners = np.concatenate([np.column_stack([ring, np.full(4, height + z)]) for z in (0.0, 1.0)])
+            sides = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+            faces = [[3, 2, 1, 0], [4, 5, 6, 7], *sides]
+            bars.append(Polyhedron(corners[:, axes], faces))
+        first, second = bars
+        found = nearest_of_meshes(first, second, (None, None))
+        if found is not None and found.features is not None and {each.kind for each in found.features} == {"edge"}:
+            n_proven += 1
+            assert found.distance == spread_pair(first, second, (None, None), UNLIMITED).clearance(0).distance
+            check_crossing(found, first, second)
+    assert n_proven > 30
+
+
 def on_lattice(rng: np.random.Generator) -> Solid:
     """Return a box, a prism of eight sides or an L, a part of its faces or a ball on a lattice, faces in any order."""
     kind = int(rng.integers(6))
@@ -111,6 +158,7 @@ def on_lattice(rng: np.random.Generator) -> Solid:
         corners = np.concatenate([np.column_stack([ring, np.full(n, z)]) for z in (0.0, 2.0)])
         sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
         faces = [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
+        corners = corners @ np.array([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]) if rng.random() < 0.3 else corners
     faces = [faces[k] for k in rng.permutation(len(faces))]
     return Surface(corners, faces[: len(faces) // 2]) if kind == 3 else Polyhedron(corners, faces)
 
