@@ -22,8 +22,9 @@ WHOLE_SUITE = 4000
 """Tests from which on a run will need nearly every kernel."""
 
 LONGEST = (
-    "test_wheel", "test_live", "test_warmup", "test_jit", "test_registry", "test_deadlines_in_process", "test_types",
-    "test_start", "test_site", "test_detail", "test_distributed", "test_jobs", "test_schemathesis", "test_size",
+    "test_wheel", "test_playground", "test_live", "test_warmup", "test_jit", "test_registry",
+    "test_deadlines_in_process", "test_types", "test_start", "test_site", "test_detail", "test_distributed",
+    "test_jobs", "test_schemathesis", "test_size",
 )  # fmt: skip
 """Files that take 10 s and more: begun first, so that at the end no process is left alone with one."""
 
