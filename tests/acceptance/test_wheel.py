@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from numba import config as numba_config
 
+from engine.compiling import kernel_cache
 from tests.acceptance.test_versions import ask_everything
 from tests.programs import COUNTER
 from tests.unit.service.test_live import Service
@@ -132,7 +133,8 @@ def test_a_wheel_has_one_package_and_the_same_bytes_twice(
         assert {name for name in names if ".dist-info" not in name} == {
             "exact_geometry", "_exact_geometry_names.py", "_exact_geometry_names.pth"
         }  # fmt: skip
-    assert full.stat().st_size < 3_000_000
+    if kernel_cache.seed() is not None:  # else kernels come from a cache, with what other tests compiled
+        assert full.stat().st_size < 3_000_000
     assert not [name for name in zipfile.ZipFile(full).namelist() if name.endswith("lock")]
 
 
