@@ -9,7 +9,8 @@ Whatever the kernel decides within a stripe is exact, and a crossing is rounded 
 vertex is kept by exactly one. Parts of a region in different stripes are one region if a ring that bounds them passes
 through both. Rounded rings are proven valid only where all edges are apart by the margin of clearance.py (Rule.PART),
 which holds for the whole if it holds in all stripes: edges nearer than that meet a common stripe. Otherwise, and in a
-few cases that are rare (a straight or repeated vertex where rings are joined), the whole is arranged at once.
+few cases that are rare (a straight or repeated vertex where rings are joined; a polygon that crosses itself on the
+boundary, so that rings meet there), the whole is arranged at once.
 
 The stripes follow from the polygons alone: the result does not depend on the number of threads.
 """
@@ -128,7 +129,7 @@ def _arrange_stripe(
     own, sizes = places_of(polygons.ring_offsets, rings), np.diff(polygons.ring_offsets)[rings]
     whole = PolygonArrays(read_only(polygons.vertices[own]), summed(sizes), one_polygon(len(rings)))
     made = run_kernel(whole, PolygonArrays(*NO_RINGS, one_polygon(0)), SELECTED_ARRAYS["union"], budget, nesting)
-    if made.status[0] != PairStatus.DONE:
+    if made.status[0] != PairStatus.DONE or _do_rings_meet(made.sources, np.repeat(nesting.shells, sizes)):
         return None
     side = (made.vertices[:, axis] >= high).astype(np.int8) - (made.vertices[:, axis] < low)
     order, offsets = _begin_outside(side != 0, made.ring_offsets)
@@ -160,6 +161,13 @@ def _arrange_stripe(
         np.append(is_shell[whole_rings], np.zeros(len(runs), np.bool_)), passages, len(made.piece_offsets) - 1,
         float(made.displacement[0]), int(made.counts[0, 3]),
     )  # fmt: skip
+
+
+def _do_rings_meet(sources: Int32Array, polygon: IntArray) -> bool:
+    """Return whether rings meet in a vertex, where all edges are apart by the margin: only where a polygon crosses
+    itself are two opposite quadrants outside. polygon: by input vertex."""
+    crossings = sources[sources[:, 1] >= 0]
+    return bool((polygon[crossings[:, 0]] == polygon[crossings[:, 1]]).any())
 
 
 def _begin_outside(is_outside: BoolArray, offsets: IntArray) -> tuple[IntArray, IntArray]:

@@ -109,3 +109,16 @@ def test_what_touches_is_united_at_once(by_stripes: list[bool]) -> None:
     covered = {(x + i, y + j) for each in squares for x, y in [each.vertices[0]] for i in (0, 1) for j in (0, 1)}
     assert first.area == len(covered)
     assert first.vertices.tobytes() == second.vertices.tobytes()
+
+
+def test_rings_that_meet_where_a_polygon_crosses_itself_are_simple(by_stripes: list[bool]) -> None:
+    """A hole between bars and a bow touches the shell where the bow crosses itself: it is a ring of its own."""
+    bow = [(4, 0), (48, 2.25), (50, 0.125), (2, 2)]
+    bars = [[(1, -0.5), (9, -0.5), (8, 9), (0, 9.25)], [(40, 0), (48, -0.25), (49, 9), (41, 9)],
+            [(2, 7), (48, 7.25), (46, 8), (4, 8.25)]]  # fmt: skip
+    small = [[(x, y), (x + 0.07, y), (x, y + 1)] for x in np.arange(60) for y in [10 + x / 64]]
+    united = engine.union_all([engine.Polygon([ring]) for ring in [bow, *bars, *small]])
+    assert (len(united.piece_offsets), len(united.ring_offsets)) == (62, 63)
+    for first, last in zip(united.ring_offsets, united.ring_offsets[1:]):
+        assert len(np.unique(united.vertices[first:last], axis=0)) == last - first
+    assert by_stripes == [False]
