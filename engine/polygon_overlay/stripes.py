@@ -83,9 +83,10 @@ def union_by_stripes(rings: RingArrays, nesting: Nesting, workers: int | None, b
     polygons = PolygonArrays(*rings, read_only(items))
     low, high = polygons.boxes(np.arange(len(items) - 1))
     axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
-    low, high = low[:, axis], high[:, axis]
+    near = _NEAR * max(abs(rings.vertices.min()), abs(rings.vertices.max()))
+    low, high = low[:, axis] - near, high[:, axis] + near
     sides = _cuts(low, high, polygons.sizes())
-    near, n_stripes = _NEAR * max(abs(rings.vertices.min()), abs(rings.vertices.max())), len(sides) - 1
+    n_stripes = len(sides) - 1
     if n_stripes < 2:
         return None
     budget.take(BY_VERTEX * n)
@@ -94,7 +95,7 @@ def union_by_stripes(rings: RingArrays, nesting: Nesting, workers: int | None, b
     def task(first: int, last: int) -> None:
         for k in range(first, last):
             if None not in made.values():  # else the whole is arranged at once
-                members = np.flatnonzero((low <= sides[k + 1] + near) & (high >= sides[k] - near))
+                members = np.flatnonzero((low <= sides[k + 1]) & (high >= sides[k]))
                 made[k] = _arrange_stripe(polygons, members, (axis, k, sides[k], sides[k + 1]), budget)
 
     pace = _SECONDS * n / n_stripes
@@ -105,7 +106,7 @@ def union_by_stripes(rings: RingArrays, nesting: Nesting, workers: int | None, b
 
 def _cuts(low: FloatArray, high: FloatArray, sizes: IntArray) -> FloatArray:
     """Return the sides of stripes that hold about as many vertices each, from -inf to inf. low, high, sizes: of
-    polygons, along the axis that stripes divide."""
+    polygons, along the axis that stripes divide; those that reach a side are in both stripes."""
     order = np.argsort(low)
     before = np.cumsum(sizes[order])
     n_stripes = min(_MOST, int(before[-1]) // _LEAST)
