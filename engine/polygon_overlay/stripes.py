@@ -101,7 +101,10 @@ def union_by_stripes(rings: RingArrays, nesting: Nesting, workers: int | None, b
     pace = _SECONDS * n / n_stripes
     run_chunks(task, n_stripes, budget=budget, first_chunk=1, workers=workers, pace=pace)
     stripes = [stripe for k in range(n_stripes) if (stripe := made.get(k)) is not None]
-    return _join(stripes, budget, workers) if len(stripes) == n_stripes else None
+    joined = _join(stripes, budget, workers) if len(stripes) == n_stripes else None
+    if joined is None:
+        budget.take(-BY_VERTEX * n)  # the whole is charged next
+    return joined
 
 
 def _cuts(low: FloatArray, high: FloatArray, sizes: IntArray) -> FloatArray:

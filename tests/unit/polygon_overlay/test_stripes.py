@@ -10,7 +10,9 @@ import pytest
 import engine
 from engine.polygon_overlay import overlay as overlays
 from engine.polygon_overlay import stripes
+from engine.polygon_overlay.run import BY_VERTEX
 from engine.polygon_overlay.stripes import union_by_stripes
+from engine.running.budget import Cancel
 from engine.types import FloatArray, read_only
 
 Maker = Callable[[np.random.Generator], list[engine.Polygon]]
@@ -97,6 +99,16 @@ def test_the_bytes_are_those_of_the_whole(
             assert each.area == expected.area
 
 
+class _Taken(Cancel):
+    """Bytes announced, and the most at any time."""
+
+    n_bytes = n_most = 0
+
+    def take(self, n_bytes: int) -> None:
+        self.n_bytes += n_bytes
+        self.n_most = max(self.n_most, self.n_bytes)
+
+
 def test_what_touches_is_united_at_once(by_stripes: list[bool]) -> None:
     """Corners on edges, shared edges, squares that meet in a corner: no margin is left."""
     rng = np.random.default_rng(0)
@@ -106,6 +118,10 @@ def test_what_touches_is_united_at_once(by_stripes: list[bool]) -> None:
     ]
     first, second = (engine.union_all(squares, workers=workers) for workers in (1, 3))
     assert by_stripes == [False, False]
+    taken = _Taken()
+    engine.union_all(squares, cancel=taken)
+    n_different = len({each.vertices.tobytes() for each in squares})
+    assert taken.n_bytes == taken.n_most == BY_VERTEX * 4 * n_different  # not once more for the whole
     covered = {(x + i, y + j) for each in squares for x, y in [each.vertices[0]] for i in (0, 1) for j in (0, 1)}
     assert first.area == len(covered)
     assert first.vertices.tobytes() == second.vertices.tobytes()
