@@ -9,8 +9,8 @@ Whatever the kernel decides within a stripe is exact, and a crossing is rounded 
 vertex is kept by exactly one. Parts of a region in different stripes are one region if a ring that bounds them passes
 through both. Rounded rings are proven valid only where all edges are apart by the margin of clearance.py (Rule.PART),
 which holds for the whole if it holds in all stripes: edges nearer than that meet a common stripe. Otherwise, and in a
-few cases that are rare (a straight or repeated vertex where rings are joined; a polygon that crosses itself on the
-boundary, so that rings meet there), the whole is arranged at once.
+few cases that are rare (a straight or repeated vertex where rings are joined; rings of several stripes that meet, where
+a polygon crosses itself), the whole is arranged at once.
 
 The stripes follow from the polygons alone: the result does not depend on the number of threads.
 """
@@ -133,7 +133,7 @@ def _arrange_stripe(
     own, sizes = places_of(polygons.ring_offsets, rings), np.diff(polygons.ring_offsets)[rings]
     whole = PolygonArrays(read_only(polygons.vertices[own]), summed(sizes), one_polygon(len(rings)))
     made = run_kernel(whole, PolygonArrays(*NO_RINGS, one_polygon(0)), SELECTED_ARRAYS["union"], budget, nesting)
-    if made.status[0] != PairStatus.DONE or _do_rings_meet(made.sources, np.repeat(nesting.shells, sizes)):
+    if made.status[0] != PairStatus.DONE:
         return None
     side = (made.vertices[:, axis] >= high).astype(np.int8) - (made.vertices[:, axis] < low)
     order, offsets = _begin_outside(side != 0, made.ring_offsets)
@@ -143,6 +143,9 @@ def _arrange_stripe(
     piece = np.cumsum(is_shell) - 1
     n_outside = np.add.reduceat(side != 0, offsets[:-1], dtype=np.int64) if len(piece) else np.zeros(0, np.int64)
     whole_rings = np.flatnonzero(n_outside == 0)
+    meets = _where_rings_meet(made.sources, np.repeat(nesting.shells, sizes))[order] & (side == 0)
+    if meets.any() and meets[np.repeat(n_outside > 0, np.diff(offsets))].any():
+        return None
 
     after = np.arange(1, len(side) + 1)
     after[offsets[1:] - 1] = offsets[:-1]
@@ -167,11 +170,11 @@ def _arrange_stripe(
     )  # fmt: skip
 
 
-def _do_rings_meet(sources: Int32Array, polygon: IntArray) -> bool:
-    """Return whether rings meet in a vertex, where all edges are apart by the margin: only where a polygon crosses
-    itself are two opposite quadrants outside. polygon: by input vertex."""
-    crossings = sources[sources[:, 1] >= 0]
-    return bool((polygon[crossings[:, 0]] == polygon[crossings[:, 1]]).any())
+def _where_rings_meet(sources: Int32Array, polygon: IntArray) -> BoolArray:
+    """Return whether rings meet, by vertex, where all edges are apart by the margin: where a polygon crosses itself, so
+    that two opposite quadrants are outside. polygon: by input vertex."""
+    first, second = sources.T
+    return (second >= 0) & (polygon[first] == polygon[np.maximum(second, 0)])
 
 
 def _begin_outside(is_outside: BoolArray, offsets: IntArray) -> tuple[IntArray, IntArray]:
@@ -326,7 +329,8 @@ def _regions(runs: IntArray, ring: IntArray, cut: IntArray, through: IntArray, n
 
 def _ordered(firsts: FloatArray, is_shell: BoolArray, region: IntArray) -> tuple[IntArray, IntArray] | None:
     """Return the rings in canonical order (ring_order.py), and the offsets of pieces into them; None if a region has
-    not one shell. firsts: the least vertex of each ring; no two are equal, since no two rings meet."""
+    not one shell. firsts: the least vertex of each ring; no two are equal: rings that meet
+    lie in opposite quadrants."""
     x, y = firsts.T
     shells = np.flatnonzero(is_shell)
     shells = shells[np.lexsort([y[shells], x[shells]])]

@@ -59,6 +59,12 @@ def _tee(_: np.random.Generator) -> list[engine.Polygon]:
     return [left, engine.Polygon([[(29.5, 3), (60, 3.25), (60.5, 7), (29.25, 7.5)]]), *grid]
 
 
+def _bows(rng: np.random.Generator) -> list[engine.Polygon]:
+    """Polygons that cross themselves: rings meet, but none of several stripes."""
+    bows = [engine.Polygon([rng.uniform((4 * x, 0), (4 * x + 2, 2), (6, 2))]) for x in range(60)]
+    return [*bows, engine.Polygon([[(-1, 50), (250, 51), (120, 52)]])]
+
+
 @pytest.fixture
 def by_stripes(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether each union so far was made by stripes."""
@@ -73,7 +79,7 @@ def by_stripes(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return seen
 
 
-@pytest.mark.parametrize("make", [_stars, _long, _holes, _tee])
+@pytest.mark.parametrize("make", [_stars, _long, _holes, _tee, _bows])
 @pytest.mark.parametrize("turn", [False, True], ids=["along x", "along y"])
 def test_the_bytes_are_those_of_the_whole(
     make: Maker, turn: bool, by_stripes: list[bool], monkeypatch: pytest.MonkeyPatch
