@@ -231,11 +231,13 @@ def _common_point(
 
 
 @inline
-def _moved(x: float, gap: Wide, size: Wide, radius: float) -> tuple[float, bool]:
-    """Return x moved by a radius times gap / size, rounded, and whether it is the nearest double."""
+def _moved(x: float, gap: Wide, size: Wide, is_one: bool, radius: float) -> tuple[float, bool]:
+    """Return x moved by a radius times gap / size, rounded, and whether it is the nearest double. is_one: whether there
+    is no other gap; with another the point is nearer than x + radius, which may halve two doubles, whatever it rounds
+    to."""
     if radius == 0.0 or gap.h == 0.0:
         return x + 0.0, True
-    if abs(gap.h) == size.h and gap.low == size.low * (1.0 if gap.h > 0.0 else -1.0):
+    if is_one:
         return (x + radius if gap.h > 0.0 else x - radius) + 0.0, True
     step = times(over(gap, size), Wide(radius, 0.0))
     end = plus(Wide(x, 0.0), step)
@@ -318,7 +320,7 @@ def _measured(
         (0, wall.x, other.x, at.x, x, gaps[0]), (1, wall.y, other.y, at.y, y, gaps[1]),
         (2, wall.z, other.z, at.z, z, gaps[2]),
     ):  # fmt: skip
-        points[0, axis], is_first = _moved(p if has_gap else at_x, gap, size, radii[0])
-        points[1, axis], is_second = _moved(q if has_gap else at_x, less(none, gap), size, radii[1])
+        points[0, axis], is_first = _moved(p if has_gap else at_x, gap, size, is_one, radii[0])
+        points[1, axis], is_second = _moved(q if has_gap else at_x, less(none, gap), size, is_one, radii[1])
         sure = sure and is_first and is_second
     return distance.h if sure else np.nan

@@ -262,7 +262,9 @@ def nearest_of_forms(
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:
         return distance, -1, -1
-    d, is_proven = move.shape[0], True
+    d, is_proven, n_apart = move.shape[0], True, 0
+    for k in range(d):
+        n_apart += w[_GAPS + 2 * k] != 0.0
     for end in range(2):
         radius, own, across = (form[RADIUS], faces, theirs) if end == 0 else (other[RADIUS], theirs, faces)
         for k in range(d):
@@ -272,7 +274,7 @@ def nearest_of_forms(
             x, gap, bound = _wide(w, at), _wide(w, _GAPS + 2 * k), error
             if radius > 0.0 and gap.h != 0.0:
                 share = over(gap, size)
-                is_whole = abs(share.h) == 1.0 and share.low == 0.0
+                is_whole = n_apart == 1 and abs(share.h) == 1.0 and share.low == 0.0  # else the step is shorter
                 step = times(share, Wide(radius if end == 0 else -radius, 0.0))
                 bound = 0.0 if is_whole and x.low == 0.0 and error == 0.0 else 4.0 * U2
                 x = plus(x, step)

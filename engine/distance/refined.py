@@ -182,7 +182,7 @@ def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, fl
     rest = less(Wide(1.0, 0.0), x)
     foot = along3(along3(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
     inside = min(top.h, their_top.h, size.h - top.h - their_top.h) / scale
-    return foot, inside, (np.sqrt(uu.h) + np.sqrt(vv.h)) / size.h * scale
+    return foot, inside, (np.sqrt(uu.h) + np.sqrt(vv.h)) / abs(size.h) * scale
 
 
 @called
@@ -202,7 +202,7 @@ def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, 
         length = max(_reach(u), _reach(v))
         scale = length * length * (length + _reach(w))
         p, inside = along3(a, _clamped_quotient(top, size), u), min(top.h, size.h - top.h) / scale
-        steepness = np.sqrt(uu.h) / size.h * scale
+        steepness = np.sqrt(uu.h) / abs(size.h) * scale  # of parallel edges the size may round to less than 0
     q, their_inside, their_steepness = _closest_on_feature(p, t, second)
     return p, q, min(inside, their_inside), steepness + their_steepness
 

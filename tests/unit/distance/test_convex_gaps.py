@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 
-from engine import Aabb, Polyhedron, Pose, Sphere, clearance
+from engine import Aabb, Polyhedron, Pose, Sphere, clearance, clearance_poses, collide_scene
 from engine.collision.convex_body import convex_body_of, pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.simple.form_relations import N_NUMBERS
 from engine.distance.convex_gaps import gaps_of_pairs
+from tests.reference.exact import nearest_double_with_root
+from tests.unit.distance.makers import CORNERS, QUADS
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -75,3 +78,19 @@ def test_the_gap_itself_is_left_open() -> None:
         gaps_of_pairs(np.full((2, N_NUMBERS), np.nan), pool, np.arange(2), np.array([[0, 1]]), still,
                       np.zeros((1, 2), np.int64), gap, True, found, np.zeros(1, np.uint8))  # fmt: skip
         assert np.array_equal(found, [expected], equal_nan=True)
+
+
+def test_boxes_of_rounded_sizes_are_as_far_as_rationals_say() -> None:
+    """Of parallel edges the denominator of the weights is 0, and rounds to a number on either side of it."""
+    draw, some = np.random.default_rng(0), [1, 3, 7, 10]
+    for _ in range(200):
+        sizes = draw.integers(1, 10, (2, 3)) / draw.choice(some, (2, 1))
+        move = draw.integers(-30, 30, 3) / draw.choice(some)
+        first, second = (Polyhedron(np.array(CORNERS) * size, QUADS) for size in sizes)
+        square = Fraction(0)
+        for x, own, their in zip(move.tolist(), *sizes.tolist()):
+            square += max(Fraction(0), Fraction(x) - Fraction(own), -Fraction(x) - Fraction(their)) ** 2
+        expected = nearest_double_with_root(Fraction(0), Fraction(1), square) if square else 0.0
+        assert clearance_poses(first, second, np.eye(3)[None], move[None]).tolist() == [expected]
+        found = collide_scene([first, second], [None, Pose(np.eye(3), move)], gap=100.0)
+        assert np.array_equal(found.distance, [expected])  # type: ignore[arg-type]

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Aabb, HalfSpace, Pose, Sphere, clearance
+from engine import Aabb, HalfSpace, Polyhedron, Pose, Sphere, clearance
 from engine.collision.result import Clearance, Feature
 from engine.distance.clearance import do_meet
 from engine.distance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
 from engine.distance.spreads import spread_pair
 from engine.running.budget import Budget
-from tests.unit.distance.makers import turn
+from tests.unit.distance.makers import CORNERS, QUADS, turn
 
 
 def number(rng: random.Random, size: float) -> float:
@@ -98,3 +98,14 @@ def test_of_several_nearest_points_those_on_the_smallest_faces_then_where_the_fi
     assert (flat.points.tolist(), flat.features[1]) == ([[2, 4], [2, 6]], Feature("vertex", (1,)))
     plane: Any = clearance(HalfSpace([0, 0, 1], -6), box)
     assert plane.features[1] == Feature("vertex", (4,))
+
+
+def test_a_point_of_a_ball_just_beside_the_middle_of_two_doubles() -> None:
+    """A second gap, 1e17 times smaller, makes the step shorter than the radius, and the middle is not reached."""
+    ball = Sphere([1.0 + 2.0**-52, 1.0, 0.5], 0.5 + 2.0**-53)
+    assert ball.center[0] + ball.radius == 1.5 + 2.0**-51  # the middle, rounded to even
+    low, high = np.array([2.0**54 + 4.0, 1.0 + 2.0**-40, 0.0]), np.array([2.0**55, 2.0, 1.0])
+    for box in (Aabb(low, high), Polyhedron(np.where(np.array(CORNERS) == 0.0, low, high), QUADS)):
+        for first, second in ((ball, box), (box, ball)):
+            found: Any = clearance(first, second)
+            assert found.points[0 if first is ball else 1].tolist() == [1.5 + 2.0**-52, 1.0, 0.5]
