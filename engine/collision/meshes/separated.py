@@ -195,11 +195,14 @@ def touches_apart(s: dual.Search, n: int, is_named: bool, row: IntArray) -> bool
     witness included if is_named."""
     if n == 1 and _touches_at_corner(s, s.contacts.pairs[0, 0], s.contacts.pairs[0, 1], is_named, row):
         return True
-    at = separating_contact(s, n)
-    if at >= 0 and not is_named:
+    at, is_proven = separating_contact(s, n), is_named  # with a witness contacts are classified below
+    for item in range(n):
+        is_proven |= s.contacts.kinds[item] != UNDECIDED  # as those of faces without area are
+    if at < 0 or not is_proven:
+        return False
+    if not is_named:
         row[RELATION] = TOUCHING
-    if at < 0 or not is_named:
-        return at >= 0
+        return True
     return _touches_in_planes(s, at, row, _new_live(s.first), _new_live(s.second), np.empty(STACK, np.int32))
 
 

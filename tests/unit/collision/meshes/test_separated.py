@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import itertools
+import random
 
 import numpy as np
 import pytest
 
-from engine import Polyhedron, Pose, Relation, Surface, clearance, collide, collide_poses
+from engine import Polyhedron, Pose, Relation, Surface, clearance, collide, collide_poses, collide_scene
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.triangle_triangle import APART
+from tests.reference.collision import are_disjoint
 from tests.unit.collision.meshes.bodies import TURN, brick, with_far_shell
+from tests.unit.distance.makers import Json
 
 TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
@@ -116,3 +119,18 @@ def test_a_common_area_with_both_bodies_on_one_side_overlaps() -> None:
         assert answer.relation == Relation.OVERLAPPING
         assert answer.detail is not None
         assert answer.detail.label == ("EQ" if at == (0, 0, 0) else "PO")
+
+
+def test_a_plane_between_a_body_and_faces_without_area_proves_no_contact() -> None:
+    rng, n_apart = random.Random(7), 0
+    for _ in range(60):
+        corners = [[[float(rng.randint(-2, 2)) for _ in range(3)] for _ in range(4)] for _ in range(2)]
+        corners[1][1] = corners[1][0]
+        given: list[Json] = [{"type": "polyhedron", "vertices": each, "faces": TETRAHEDRON} for each in corners]
+        bodies = [Polyhedron(each, TETRAHEDRON) for each in corners]
+        are_apart = are_disjoint(*given)
+        n_apart += are_apart
+        assert (collide(*bodies, witness=False).relation == Relation.DISJOINT) == are_apart
+        assert (collide_poses(*bodies, [np.eye(3)], [[0, 0, 0]])[0] == Relation.DISJOINT) == are_apart
+        assert (len(collide_scene(bodies, witnesses=False).first) == 0) == are_apart
+    assert 10 < n_apart < 50
