@@ -264,9 +264,10 @@ def _cut(
             if m:
                 budget.take(_BYTES * m)
                 are_long = np.full(m, UNDECIDED)
-                if is_known:  # pieces that kernels made have ends that round alike only if they are one
+                if is_known:  # contacts that round alike are one in kernels; an end of a segment may be none
                     are_exact = ~np.isin(pieces.source, rational) if len(rational) else True
-                    are_long = np.where(are_exact, pieces.t[:, 0] != pieces.t[:, 1], UNDECIDED)
+                    differ, own = pieces.t[:, 0] != pieces.t[:, 1], pieces.faces < 0
+                    are_long = np.where(are_exact & (differ | (own[:, 0] == own[:, 1])), differ, UNDECIDED)
                 parts[group] = LoosePieces(items[pieces.source], np.full(m, body), are_long, *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)

@@ -414,3 +414,13 @@ def test_ends_soon_where_many_trees_of_solids_are_placed(keep: Any) -> None:
     with pytest.raises(DeadlineExceededError):
         scene.clip_segments(np.ones((60, 2, 3)) * [[[-2.0], [2.0]]], keep=keep, deadline=0.02)
     assert time.process_time() - start < 0.5
+
+
+@pytest.mark.parametrize("y", [0.25, 0.5])
+def test_a_piece_whose_ends_have_the_same_double_is_longer_than_a_point(y: float) -> None:
+    """The second end is no contact: it lies within the square, 2^-60 behind its side."""
+    square, segments = Polygon([[[0, 0], [1, 0], [1, 1], [0, 1]]]), np.array([[[-1.0, y], [2.0**-60, y]]])
+    for keep in ("all", "first"):
+        found: Any = Scene([square]).clip_segments(segments, keep=keep)
+        assert (found.t.tolist(), found.start.tolist(), found.end.tolist()) == ([[1, 1]], [[0, y]], [[2.0**-60, y]])
+        assert found.ranks.tolist() == [[0, 1]]
