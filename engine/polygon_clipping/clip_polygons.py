@@ -101,6 +101,8 @@ class ClippedPolygons(Pictured, Ragged):
 
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
+_MANY: Final = 1 << 16
+"""Rings from which several threads put in place what is left."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any] | SolidsLike
 
 
@@ -339,12 +341,14 @@ def _assemble(
     """Return the clipped polygons. parts: by number of their first polygon, the vertices (n, dim) left of several, ring
     after ring; sizes: number of vertices left of each ring, 0 for rings that vanished; polygon_offsets: of polygons
     into all given rings; flags: `status` and `may_have_bridges`."""
+    if len(sizes) < _MANY:
+        return _assemble_at_once(parts, sizes, polygon_offsets, flags, dimension)
     firsts = sorted(parts)
     ends = [*firsts[1:], len(polygon_offsets) - 1]
     starts = summed([len(parts[first]) for first in firsts])
     parted = [sizes[polygon_offsets[first] : polygon_offsets[end]] for first, end in zip(firsts, ends)]
     rings = summed([int(np.count_nonzero(some)) for some in parted])
-    vertices = parts[0] if len(firsts) == 1 else np.empty((starts[-1], dimension))
+    vertices = np.empty((starts[-1], dimension))
     contours, ring_offsets = np.empty(rings[-1], np.int64), np.empty(rings[-1] + 1, np.int64)
     offsets = np.empty(len(polygon_offsets), np.int64)
     ring_offsets[0] = offsets[0] = 0
@@ -362,12 +366,24 @@ def _assemble(
             if not is_single:
                 number = np.arange(len(is_left)) - np.repeat(own[:-1] - own[0], np.diff(own))
                 contours[ring:end] = number[is_left]
-            if len(firsts) > 1:
-                vertices[starts[k] : starts[k + 1]] = parts[firsts[k]]
+            vertices[starts[k] : starts[k + 1]] = parts[firsts[k]]
 
-    if len(firsts) == 1:
-        fill(0, 1)
-    else:
-        pace = SECONDS_OF_BYTE * (vertices.nbytes + 3 * offsets.nbytes) / max(1, len(firsts))
-        run_chunks(fill, len(firsts), budget=budget, workers=workers, first_chunk=1, pace=pace)
+    pace = SECONDS_OF_BYTE * (vertices.nbytes + 3 * offsets.nbytes) / len(firsts)
+    run_chunks(fill, len(firsts), budget=budget, workers=workers, first_chunk=1, pace=pace)
     return ClippedPolygons(vertices, ring_offsets, offsets, contours, *flags)
+
+
+def _assemble_at_once(
+    parts: dict[int, FloatArray], sizes: IntArray, polygon_offsets: IntArray, flags: tuple[Int8Array, BoolArray],
+    dimension: int,
+) -> ClippedPolygons:  # fmt: skip
+    """As `_assemble`, for few rings."""
+    vertices = parts[0] if len(parts) == 1 else np.concatenate([
+        np.zeros((0, dimension)), *(parts[first] for first in sorted(parts))
+    ])  # fmt: skip
+    left, ends = np.flatnonzero(sizes), summed(sizes > 0)
+    contours = np.zeros(len(left), np.int64)
+    if len(polygon_offsets) != len(sizes) + 1:  # not a ring each
+        owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
+        contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
+    return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, *flags)

@@ -26,8 +26,15 @@ USUAL: Final = (2.0**-100, 2.0**120)
 `numpy.vdot` does not warn on overflow, as `dot` does."""
 
 
+_LARGE: Final = 1 << 18
+"""Numbers in an array from which several threads fill or look through it."""
+
+
 def equal_rings(n: int, size: int, workers: int | None = 1, budget: Budget = UNLIMITED) -> tuple[IntArray, IntArray]:
     """Return ring offsets and polygon offsets, read-only, of n polygons of one ring of `size` vertices each."""
+    if n < _LARGE:
+        numbers = np.arange(n + 1)
+        return read_only(size * numbers), read_only(numbers)
     offsets, numbers = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
 
     def fill(first: int, last: int) -> None:
@@ -113,6 +120,8 @@ def _size_of(vertices: FloatArray, workers: int | None, budget: Budget) -> float
     square = np.vdot(vertices, vertices) if len(vertices) <= FEW else 0.0
     if USUAL[0] < square < USUAL[1]:
         return sqrt(square)
+    if len(vertices) < _LARGE:
+        return largest_of(vertices)
     sizes = [0.0]
     run_chunks(
         lambda first, last: sizes.append(largest_of(vertices[first:last])), len(vertices), budget=budget,

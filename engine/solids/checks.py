@@ -226,13 +226,14 @@ def check_finite(array: FloatArray, where: Where, budget: Budget = UNLIMITED, wo
     flat = array.reshape(-1)
     if len(flat) <= _FEW and math.isfinite(sum(flat.tolist())):
         return
-    are_finite: list[bool] = []
+    are_finite = [bool(np.isfinite(flat).all())] if len(flat) <= _BLOCK else []
 
     def look(first: int, last: int) -> None:
         poll()
         are_finite.append(bool(np.isfinite(flat[first:last]).all()))
 
-    run_chunks(look, len(flat), budget=budget, workers=workers, first_chunk=_BLOCK)
+    if not are_finite:
+        run_chunks(look, len(flat), budget=budget, workers=workers, first_chunk=_BLOCK)
     if not all(are_finite):
         index = int(np.isfinite(flat).argmin())
         path = _path(index, list(array.shape), where)
