@@ -25,6 +25,22 @@ START_SECONDS: Final = 50e-6
 """Time from one thread's start to the next."""
 
 
+def makespan(ranges: Ranges, run: Callable[[int, int], float], lock_seconds: float = LOCK_SECONDS) -> float:
+    """Return when the last of the virtual threads ends, which start one after another and take ranges as they are free.
+    run: called with each range, returns its seconds, after `Ranges.took`. lock_seconds: held for each range."""
+    threads = [(k * START_SECONDS, k) for k in range(ranges.n_threads)]
+    lock_free = end = 0.0
+    while threads:  # bound: each turn takes a range or ends a thread
+        now, thread = heapq.heappop(threads)
+        taken = ranges.take(is_shared=False)
+        if taken is None:
+            end = max(end, now)
+            continue
+        lock_free = max(now, lock_free) + lock_seconds
+        heapq.heappush(threads, (lock_free + run(*taken), thread))
+    return end
+
+
 class Spent:
     """CPU seconds of one call within its shared ranges, and the makespan of these on virtual threads."""
 
@@ -35,25 +51,19 @@ class Spent:
         self, task: Callable[[int, int], object], ranges: Ranges, budget: Budget, progress: Progress | None
     ) -> None:
         """Run ranges here, in place of `parallel._run_threaded`."""
-        threads = [(k * START_SECONDS, k) for k in range(ranges.n_threads)]
-        lock_free = end = 0.0
-        while threads:  # bound: each turn takes a range or ends a thread
-            now, thread = heapq.heappop(threads)
-            taken = ranges.take(is_shared=False)
-            if taken is None:
-                end = max(end, now)
-                continue
+
+        def run(first: int, stop: int) -> float:
             before = time.thread_time()
-            task(*taken)
+            task(first, stop)
             seconds = time.thread_time() - before
-            ranges.took(taken[1] - taken[0], seconds)
+            ranges.took(stop - first, seconds)
             budget.check()
             if progress is not None:
-                progress(taken[1] - taken[0])
+                progress(stop - first)
             self.in_ranges += seconds
-            lock_free = max(now, lock_free) + LOCK_SECONDS
-            heapq.heappush(threads, (lock_free + seconds, thread))
-        self.makespan += end
+            return seconds
+
+        self.makespan += makespan(ranges, run)
 
 
 @contextmanager

@@ -4,7 +4,6 @@ simulation, without a clock."""
 from __future__ import annotations
 
 import gc
-import heapq
 import multiprocessing
 import threading
 import time
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.simulated_cores import makespan
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 from engine.running import parallel
 from engine.running.budget import Budget, Cancel
@@ -271,25 +271,17 @@ def _simulate(n_cores: int, n_items: int, pace: Callable[[int], float], lock_sec
     summed = np.concatenate([[0.0], np.cumsum(costs * (n_items / 1000))])
     cost_up_to = lambda item: float(np.interp(item * 1000 / n_items, np.arange(1001), summed))  # noqa: E731
     ranges = Ranges(0, n_items, pace(0), threads_that_pay(n_items * pace(0), n_cores))
-    free_at = lock_free = 0.0
-    threads = [(k * 50e-6, k) for k in range(ranges.n_threads)]  # they start one after another
-    heapq.heapify(threads)
     n_chunks = n_done = 0
-    end = 0.0
-    while threads:  # bound: each turn takes a range or ends a thread
-        now, thread = heapq.heappop(threads)
-        taken = ranges.take(is_shared=False)
-        if taken is None:
-            end = max(end, now)
-            continue
-        first, stop = taken
+
+    def run(first: int, stop: int) -> float:
+        nonlocal n_chunks, n_done
         assert first == n_done
         n_done, n_chunks = stop, n_chunks + 1
-        free_at = max(now, lock_free) + lock_seconds
-        lock_free = free_at
         seconds = cost_up_to(stop) - cost_up_to(first)
         ranges.took(stop - first, seconds + lock_seconds)
-        heapq.heappush(threads, (free_at + seconds, thread))
+        return seconds
+
+    end = makespan(ranges, run, lock_seconds)
     assert n_done == n_items
     return end, n_chunks
 
