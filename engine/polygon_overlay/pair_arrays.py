@@ -74,9 +74,13 @@ def take_pairs(pairs: PairResults, items: IntArray) -> PairResults:
 
 def places_of(offsets: IntArray, items: IntArray) -> IntArray:
     """Return the concatenated ranges offsets[k] .. offsets[k + 1] - 1 for k in ``items``."""
-    sizes = offsets[items + 1] - offsets[items]
+    return places_from(offsets[items], offsets[items + 1] - offsets[items])
+
+
+def places_from(starts: IntArray, sizes: IntArray) -> IntArray:
+    """Return the concatenated ranges starts[k] .. starts[k] + sizes[k] - 1."""
     ends = np.cumsum(sizes)
-    return np.arange(ends[-1] if len(ends) else 0) + np.repeat(offsets[items] - (ends - sizes), sizes)
+    return np.arange(ends[-1] if len(ends) else 0) + np.repeat(starts - (ends - sizes), sizes)
 
 
 def concatenate_pairs(parts: list[PairResults], budget: Budget = UNLIMITED, workers: int | None = 1) -> PairResults:
@@ -205,7 +209,7 @@ def arrays_of(coordinates: object, ring_offsets: object, polygon_offsets: object
         raise RingTooShortError(f"ring {place} of ring_offsets has one position; give 3", ("ring_offsets", place))
     is_ring = sizes >= _LEAST
     offsets = summed(sizes[is_ring])
-    places = np.arange(offsets[-1]) + np.repeat(starts[is_ring] - offsets[:-1], sizes[is_ring])
+    places = places_from(starts[is_ring], sizes[is_ring])
     return PolygonArrays(read_only(vertices[places]), offsets, read_only(summed(is_ring.astype(np.int64))[groups]))
 
 

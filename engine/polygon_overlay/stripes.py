@@ -25,7 +25,7 @@ from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.implicit_rings import NO_RINGS, edges_along, one_polygon
-from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays, one_pair, places_of
+from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays, one_pair, places_from, places_of
 from engine.polygon_overlay.run import BY_VERTEX, SELECTED_ARRAYS, run_kernel
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.running.budget import Budget
@@ -252,9 +252,7 @@ def _join(stripes: list[_Stripe], budget: Budget, workers: int | None) -> PairRe
 
 def places_of_runs(runs: IntArray, numbers: IntArray) -> IntArray:
     """Return the concatenated ranges runs[k, 0] .. runs[k, 1] - 1 for k in ``numbers``."""
-    starts, sizes = runs[numbers, 0], runs[numbers, 1] - runs[numbers, 0]
-    ends = np.cumsum(sizes)
-    return np.arange(ends[-1] if len(ends) else 0) + np.repeat(starts - (ends - sizes), sizes)
+    return places_from(runs[numbers, 0], runs[numbers, 1] - runs[numbers, 0])
 
 
 def _link(passages: _Passages, n_runs: int) -> tuple[IntArray, IntArray] | None:
