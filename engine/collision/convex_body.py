@@ -18,7 +18,7 @@ from engine.compiling.jit import entry_of, kernel, merged
 from engine.predicates.vectors import cross, length, minus
 from engine.solids.base import Solid
 from engine.solids.convexity import convexity
-from engine.solids.mesh import Mesh, Polyhedron
+from engine.solids.mesh import Polyhedron, used_by_faces
 from engine.solids.primitives import Aabb, Sphere
 from engine.types import FloatArray, IntArray, Point3, read_only
 
@@ -89,14 +89,6 @@ def convex_body_of(solid: Solid) -> ConvexBody | None:
         return None
 
     return solid.prepared("convex_body", build)
-
-
-def used_by_faces(solid: Mesh) -> tuple[FloatArray, IntArray]:
-    """Return the vertices (n, 3) of a mesh that its faces use, and its triangles by their numbers."""
-    vertices, triangles = solid.vertices, solid.triangles
-    used = np.zeros(len(vertices), np.bool_)
-    used[triangles] = True
-    return (vertices, triangles) if used.all() else (vertices[used], (np.cumsum(used) - 1)[triangles])
 
 
 def _ball(ball: Sphere) -> ConvexBody:

@@ -16,51 +16,43 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.convex_body import point_of
-from engine.collision.convex_pair import PlacedBody
+from engine.collision.convex_body import ConvexArrays, point_of
+from engine.collision.convex_pair import PlacedBody, placed_body
 from engine.collision.meshes.near_triangles import FACE
-from engine.collision.meshes.placement import Placement, placed
+from engine.collision.meshes.placement import PoseArrays, is_lattice_rotation, placed, rotate
 from engine.compiling.jit import called, inline
 from engine.distance.closed_forms import Wide, less, over, plus, root, times
 from engine.predicates.error_free import U2, is_correctly_rounded, two_diff, two_sum
 from engine.predicates.orientation import orient2d
 from engine.types import UNDECIDED, FloatArray, IntArray, Point2, Point3
 
-_OUTSIDE, _UNKNOWN = -1, -2
-_SMALLEST, _LARGEST = 2.0**-400, 2.0**400
-"""Range of coordinates that are not 0, and of gaps: squares neither underflow nor overflow."""
+_OUTSIDE: Final = -1
+_UNKNOWN: Final = -2
+"""In place of a code: there is no common point, or none is proven."""
+_SMALLEST: Final = 2.0**-400
+_LARGEST: Final = 2.0**400
+"""Range (_SMALLEST .. _LARGEST) of coordinates that are not 0, and of gaps: squares neither underflow nor overflow."""
 _BOUND: Final = 64.0 * U2
 """Of a root of squares, less two radii, and of a point moved by a radius, times the numbers: 32 u^2 for the root
 (`closed_forms.py`), 16 u^2 for the quotient, 5 for the product, 4 a sum."""
 
 
 class Part(NamedTuple):
-    """What a triangle has on the walls: n corners, of which k and l are the first two."""
+    """What a triangle has on the walls: n corners, of which k and other are the first two."""
 
     n: int
     k: int
-    l: int  # noqa: E741
+    other: int
 
 
 @inline
-def _turns_axes(place: Placement) -> bool:
-    """Return whether a rotation only permutes axes and flips signs."""
-    for row in (place.x, place.y, place.z):
-        for entry in (row.x, row.y, row.z):
-            if entry != 0.0 and abs(entry) != 1.0:
-                return False
-    return True
-
-
-@inline
-def _are_images_exact(f: PlacedBody) -> bool:
+def _are_images_exact(f: PlacedBody, rotation: FloatArray) -> bool:
     """Return whether no coordinate of a vertex is rounded by the pose of its body, or out of range."""
-    if not _turns_axes(f.place):
+    if not is_lattice_rotation(rotation):
         return False
-    move, zero = f.place.shift, Point3(0.0, 0.0, 0.0)
-    turn = Placement(f.place.x, f.place.y, f.place.z, zero, f.place.is_posed, 0.0)
+    move = f.place.shift
     for vertex in range(f.first, f.stop):
-        v = placed(point_of(f.points, vertex), turn)
+        v = rotate(f.place, point_of(f.points, vertex))
         for x, shift in ((v.x, move.x), (v.y, move.y), (v.z, move.z)):
             image, rest = two_sum(x, shift)
             if rest != 0.0 or not (image == 0.0 or _SMALLEST < abs(image) < _LARGEST):
@@ -123,13 +115,13 @@ def _unseen(t: Point2, gaps: tuple[bool, bool, bool]) -> Point3:
 @inline
 def _number(part: Part, place: int) -> int:
     """Return the corner of the triangle that is number ``place`` of its part."""
-    return part.k if place == 0 else (part.l if place == 1 else 2)
+    return part.k if place == 0 else (part.other if place == 1 else 2)
 
 
 @inline
 def _edge(part: Part, place: int) -> int:
     """Return the code of edge ``place`` of a part of two or three corners."""
-    return 3 + (place if part.n == 3 else (part.k if part.l == part.k + 1 else part.l))
+    return 3 + (place if part.n == 3 else (part.k if part.other == part.k + 1 else part.other))
 
 
 @called
@@ -140,7 +132,7 @@ def _code_at(t: Point2, part: Part, a: Point2, b: Point2, c: Point2) -> int:
         return part.k if t.x == a.x and t.y == a.y else _OUTSIDE
     if part.n == 2:
         if t.x == b.x and t.y == b.y:
-            return part.l
+            return part.other
         side = orient2d(a, b, t)
         if side == UNDECIDED:
             return _UNKNOWN
@@ -244,20 +236,16 @@ def _moved(x: float, gap: Wide, size: Wide, is_one: bool, radius: float) -> tupl
     return end.h, is_correctly_rounded(end.h, end.low, _BOUND * (abs(x) + radius))
 
 
-class Faces(NamedTuple):
-    """The triangles (m, 3) of a body, and the face of each (m,), ascending; both are empty for a ball."""
-
-    triangles: IntArray
-    faces: IntArray
-
-
 @called
 def nearest_across(
-    a: PlacedBody, mesh: Faces, b: PlacedBody, other_mesh: Faces, points: FloatArray, row: IntArray
-) -> float:
-    """Return the distance of two bodies and fill points (2, 3) and row (4,), as `nearest_of_convex` does; NaN where
-    they do not lie apart along axes, or any of it is unproven."""
-    if not (_are_images_exact(a) and _are_images_exact(b)):
+    first: ConvexArrays, faces: IntArray, first_pose: PoseArrays, second: ConvexArrays, second_faces: IntArray,
+    second_pose: PoseArrays, points: FloatArray, row: IntArray,
+) -> float:  # fmt: skip
+    """Return the distance of two bodies, convex or not, and fill points (2, 3) and row (4,), as `nearest_of_convex`
+    does; NaN where they do not lie apart along axes, or any of it is unproven. faces, second_faces: of the triangles,
+    ascending; a ball has none."""
+    a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
+    if not (_are_images_exact(a, first_pose.rotations[0]) and _are_images_exact(b, second_pose.rotations[0])):
         return np.nan
     (low, high), (other_low, other_high) = _box_of(a), _box_of(b)
     x, other_x, has_x = _walls_along(low.x, high.x, other_low.x, other_high.x)
@@ -266,32 +254,32 @@ def nearest_across(
     wall, other, gaps = Point3(x, y, z), Point3(other_x, other_y, other_z), (has_x, has_y, has_z)
     if not (has_x or has_y or has_z):
         return np.nan
-    triangles, others, best = mesh.triangles, other_mesh.triangles, Point2(0.0, 0.0)
+    triangles, others, best = first.triangles, second.triangles, Point2(0.0, 0.0)
     row[0] = row[2] = -1
     is_known, face, their_face = False, -1, -1
     for i in range(max(1, triangles.shape[0])):
         own = _part_of(a, triangles, i, wall, gaps)
-        if own.n == 0 or (is_known and mesh.faces.size > 0 and mesh.faces[i] != face):
+        if own.n == 0 or (is_known and faces.size > 0 and faces[i] != face):
             continue
-        p, q = _corner(a, triangles, i, own.k), _corner(a, triangles, i, own.l)
+        p, q = _corner(a, triangles, i, own.k), _corner(a, triangles, i, own.other)
         corners = _seen(p, gaps), _seen(q, gaps), _seen(_corner(a, triangles, i, 2), gaps)
         for j in range(max(1, others.shape[0])):
-            if is_known and (other_mesh.faces.size == 0 or other_mesh.faces[j] >= their_face):
+            if is_known and (second_faces.size == 0 or second_faces[j] >= their_face):
                 break
             their = _part_of(b, others, j, other, gaps)
             if their.n == 0:
                 continue
-            s, t = _corner(b, others, j, their.k), _corner(b, others, j, their.l)
+            s, t = _corner(b, others, j, their.k), _corner(b, others, j, their.other)
             their_corners = _seen(s, gaps), _seen(t, gaps), _seen(_corner(b, others, j, 2), gaps)
             code, their_code, seen = _common_point(own, corners, their, their_corners)
             if code == _UNKNOWN or their_code == _UNKNOWN:
                 return np.nan
             if code != _OUTSIDE:
                 is_known, best, row[1], row[3] = True, seen, code, their_code
-                if mesh.faces.size > 0:
-                    row[0], face = i, mesh.faces[i]
-                if other_mesh.faces.size > 0:
-                    row[2], their_face = j, other_mesh.faces[j]
+                if faces.size > 0:
+                    row[0], face = i, faces[i]
+                if second_faces.size > 0:
+                    row[2], their_face = j, second_faces[j]
     return _measured(_unseen(best, gaps), wall, other, gaps, (a.round, b.round), points) if is_known else np.nan
 
 

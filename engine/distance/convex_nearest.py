@@ -26,7 +26,6 @@ from engine.collision.convex_body import (
     convex_body_of,
     point_of,
     pool_of_one,
-    used_by_faces,
 )
 from engine.collision.convex_pair import PlacedBody, placed_body
 from engine.collision.meshes.mesh_arrays import STILL
@@ -34,7 +33,7 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays, rotate
 from engine.collision.result import Clearance, Feature, Poses
 from engine.compiling.jit import called, entry_of, inline, kernel, merged
-from engine.distance.across_axes import Faces, nearest_across
+from engine.distance.across_axes import nearest_across
 from engine.distance.closed_forms import Wide3, less3
 from engine.distance.convex_gaps import (
     FOUND,
@@ -52,7 +51,7 @@ from engine.distance.spreads import feature_of
 from engine.predicates.vectors import dot, minus
 from engine.running.budget import Budget
 from engine.solids.base import Solid
-from engine.solids.mesh import Mesh, Polyhedron
+from engine.solids.mesh import Mesh, Polyhedron, used_by_faces
 from engine.types import FlagArray, FloatArray, IntArray, Point3, read_only
 
 MOST_TRIANGLES: Final = 2048
@@ -233,10 +232,10 @@ def nearest_of_convex(
     """Return the distance of two convex bodies, the nearest double, and fill points (2, 3) with the nearest points and
     row (4,) with a triangle and the code of the feature in it of each body; NaN where any of it is unproven. Of several
     triangles the first is named. faces, second_faces: of the triangles."""
-    a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
     distance = _only_nearest(first, first_pose, second, second_pose, points, row)
-    mesh, other = Faces(first.triangles, faces), Faces(second.triangles, second_faces)
-    return distance if distance > 0.0 else nearest_across(a, mesh, b, other, points, row)
+    if distance > 0.0:
+        return distance
+    return nearest_across(first, faces, first_pose, second, second_faces, second_pose, points, row)
 
 
 @kernel
@@ -245,9 +244,7 @@ def nearest_along_axes(
     second_pose: PoseArrays, points: FloatArray, row: IntArray,
 ) -> float:  # fmt: skip
     """As `nearest_of_convex`, of bodies that need not be convex; only their vertices and triangles are read."""
-    a, b = placed_body(first, 0, first_pose, 0), placed_body(second, 0, second_pose, 0)
-    mesh, other = Faces(first.triangles, faces), Faces(second.triangles, second_faces)
-    return nearest_across(a, mesh, b, other, points, row)
+    return nearest_across(first, faces, first_pose, second, second_faces, second_pose, points, row)
 
 
 @called

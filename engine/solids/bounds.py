@@ -19,7 +19,7 @@ from engine.running.parallel import Options, Progress, check_options
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
 from engine.solids.columns import brief
-from engine.solids.mesh import Mesh
+from engine.solids.mesh import Mesh, used_by_faces
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, Sphere, Triangle
 from engine.solids.registry import Box, refused, row_of, unbounded
@@ -160,11 +160,7 @@ def _around(points: FloatArray, budget: Budget, box: Aabb | None = None) -> Repo
 
 def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
     """Return the vertices (n, dimension) of a solid, of a mesh those that a face uses."""
-    if not isinstance(mesh, Mesh):
-        return mesh.vertices
-    is_used = np.zeros(len(mesh.vertices), np.bool_)
-    is_used[mesh.triangles] = True
-    return mesh.vertices if is_used.all() else mesh.vertices[is_used]
+    return used_by_faces(mesh)[0] if isinstance(mesh, Mesh) else mesh.vertices
 
 
 def bounds_of_convex(solid: Convex, budget: Budget) -> Reported:

@@ -357,3 +357,11 @@ class Surface(Mesh):
     __slots__ = ()
 
     type: ClassVar[str] = "surface"
+
+
+def used_by_faces(mesh: Mesh) -> tuple[FloatArray, IntArray]:
+    """Return the vertices (n, 3) of a mesh that its faces use, and its triangles by their numbers."""
+    vertices, triangles = mesh.vertices, mesh.triangles
+    used = np.zeros(len(vertices), np.bool_)
+    used[triangles] = True
+    return (vertices, triangles) if used.all() else (vertices[used], (np.cumsum(used) - 1)[triangles])
