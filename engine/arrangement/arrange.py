@@ -130,18 +130,17 @@ def _intersect_all(
     coordinates = np.column_stack([nodes.xs, nodes.ys])
     first, second = coordinates[array[:, 0]], coordinates[array[:, 1]]
     pairs = pairs_of_boxes(np.minimum(first, second), np.maximum(first, second), budget)
-    budget.check()
-    if nodes.all_floats:
-        verdicts = classify_pairs(coordinates, array, pairs, budget)
-        is_hit = verdicts != MISS
-        pairs, verdicts = pairs[is_hit], verdicts[is_hit]
-    else:
-        verdicts = np.full(len(pairs), UNDECIDED, np.int8)
-    n_exact = 0
-    for start in range(0, len(pairs), _POLL):  # a list of millions of pairs would take seconds
+    all_floats, n_exact = nodes.all_floats, 0
+    for start in range(0, len(pairs), _CHUNK):
         budget.check()
-        some = slice(start, start + _POLL)
-        for (i, j), verdict in zip(pairs[some].tolist(), verdicts[some].tolist()):
+        some = pairs[start : start + _CHUNK]
+        verdicts = np.full(len(some), UNDECIDED, np.int8)
+        if all_floats:
+            verdicts = classify_pairs(coordinates, array, some)
+            some, verdicts = some[verdicts != MISS], verdicts[verdicts != MISS]
+        for count, (i, j, verdict) in enumerate(zip(*some.T.tolist(), verdicts.tolist())):
+            if count % _POLL == 0:
+                budget.check()
             if verdict == CROSS:
                 number = nodes.add(crossing(lines[i], lines[j]))
                 on_segment.setdefault(i, set()).add(number)
@@ -165,27 +164,24 @@ def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
     return sign
 
 
-def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray, budget: Budget) -> Int8Array:
+def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray) -> Int8Array:
     """Return for each pair of segments MISS, CROSS (one common point, interior to both) or UNDECIDED. coordinates:
     (n_nodes, 2) float64, exact. segments: (n_segments, 2) int64 nodes. pairs: (n_pairs, 2) int64 segments. Segments
     that share an end and are proven not collinear are a MISS: that end is their only common point.
     """
+    first, second = segments[pairs.T]
+    a, b, c, d = (coordinates[nodes] for nodes in (first[:, 0], first[:, 1], second[:, 0], second[:, 1]))
+    with np.errstate(all="ignore"):
+        sides = [_orientation(a, b, c), _orientation(a, b, d), _orientation(c, d, a), _orientation(c, d, b)]
+    is_decided = [side != UNDECIDED for side in sides]
+    shared = (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
+    one_sided = (is_decided[0] & (sides[0] == sides[1])) | (is_decided[2] & (sides[2] == sides[3]))
+    bent = shared & (is_decided[0] | is_decided[1] | is_decided[2] | is_decided[3])
+    straddle = is_decided[0] & is_decided[1] & is_decided[2] & is_decided[3] & ~shared
+    straddle &= (sides[0] != sides[1]) & (sides[2] != sides[3])
     result = np.full(len(pairs), UNDECIDED, np.int8)
-    for start in range(0, len(pairs), _CHUNK):
-        budget.check()
-        first, second = segments[pairs[start : start + _CHUNK].T]
-        a, b, c, d = (coordinates[nodes] for nodes in (first[:, 0], first[:, 1], second[:, 0], second[:, 1]))
-        with np.errstate(all="ignore"):
-            sides = [_orientation(a, b, c), _orientation(a, b, d), _orientation(c, d, a), _orientation(c, d, b)]
-        is_decided = [side != UNDECIDED for side in sides]
-        shared = (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
-        one_sided = (is_decided[0] & (sides[0] == sides[1])) | (is_decided[2] & (sides[2] == sides[3]))
-        bent = shared & (is_decided[0] | is_decided[1] | is_decided[2] | is_decided[3])
-        straddle = is_decided[0] & is_decided[1] & is_decided[2] & is_decided[3] & ~shared
-        straddle &= (sides[0] != sides[1]) & (sides[2] != sides[3])
-        part = result[start : start + _CHUNK]
-        part[straddle] = CROSS
-        part[one_sided | bent] = MISS
+    result[straddle] = CROSS
+    result[one_sided | bent] = MISS
     return result
 
 

@@ -108,7 +108,7 @@ def test_sure_verdicts_are_right(scale: float) -> None:
     segments = np.arange(400).reshape(-1, 2)
     pairs = random.integers(0, 200, (3000, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    verdicts = classify_pairs(points, segments, pairs, Budget())
+    verdicts = classify_pairs(points, segments, pairs)
     for (i, j), verdict in zip(pairs, verdicts, strict=True):
         (a, b), (c, d) = points[segments[i]], points[segments[j]]
         first = exact_turn(a, b, c) * exact_turn(a, b, d)
@@ -124,9 +124,9 @@ def test_sure_verdicts_are_right(scale: float) -> None:
 def test_filter_segments_that_share_an_end_miss_unless_collinear() -> None:
     points = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (2.0, 0.0)])
     segments = np.array([(0, 1), (0, 2), (0, 3)])
-    assert classify_pairs(points, segments, np.array([(0, 1), (0, 2)]), Budget()).tolist() == [MISS, UNDECIDED]
+    assert classify_pairs(points, segments, np.array([(0, 1), (0, 2)])).tolist() == [MISS, UNDECIDED]
 
 
 def test_filter_is_unsure_of_overflow() -> None:
     points = np.array([(-1e300, 0.0), (1e300, 1.0), (0.0, -1e300), (0.0, 1e300)])
-    assert classify_pairs(points, np.array([(0, 1), (2, 3)]), np.array([(0, 1)]), Budget()).tolist() == [UNDECIDED]
+    assert classify_pairs(points, np.array([(0, 1), (2, 3)]), np.array([(0, 1)])).tolist() == [UNDECIDED]

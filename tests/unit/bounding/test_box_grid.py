@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -76,7 +74,8 @@ def test_all_pairs_at_once(stretch: tuple[float, float], monkeypatch: pytest.Mon
     high = low + random.integers(0, 6, (150, 2)) * stretch
     expected = brute_force(low, high)
     assert all_pairs_of_boxes(low, high, Budget()).tolist() == expected
-    monkeypatch.setattr("engine.bounding.box_grid.pairs_of_boxes", partial(pairs_of_boxes, block=50))
+    for name, value in {"BLOCK": 50, "_SAMPLE": 5}.items():  # many blocks, sorted in many ranges
+        monkeypatch.setattr(f"engine.bounding.box_grid.{name}", value)
     assert all_pairs_of_boxes(low, high, Budget()).tolist() == expected
     assert all_pairs_of_boxes(low[:0], high[:0], Budget()).shape == (0, 2)
 
