@@ -25,7 +25,7 @@ import numpy as np
 from engine.compiling.jit import entry_of
 from engine.errors import NotRepresentableError
 from engine.predicates.rational import cross, minus, nearest_float, squared_length
-from engine.running.budget import Budget
+from engine.running.budget import Budget, polled
 from engine.solid_cutting.caps import Area, Seen
 from engine.solid_cutting.exact_measures import (
     ExactMesh,
@@ -54,11 +54,11 @@ def _cut_off(points: Points, numbers: Iterable[int], bits: int) -> tuple[dict[in
         high, low = (np.ldexp(some, k) for some in points.at(np.array(numbers, np.int64)))
         whole = np.rint(high)
         rest = np.rint((high - whole) + low)
-        for number, large, small in zip(numbers, whole.tolist(), rest.tolist()):
+        for number, large, small in polled(zip(numbers, whole.tolist(), rest.tolist())):
             x, y, z = (int(a) + int(b) for a, b in zip(large, small))
             places[number] = x, y, z
         numbers = []
-    for number in numbers:
+    for number in polled(numbers):
         x, y, z, w = points.exact(number)
         w, up = (w, k) if k >= 0 else (w << -k, 0)
         places[number] = ((x << up) // w, (y << up) // w, (z << up) // w)
@@ -115,7 +115,7 @@ def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: 
         base = Fraction(z0) * Fraction(2) ** k
         z_unit, z_rest = base.numerator // base.denominator, base.denominator
         total = 0
-        for i, j, m in rows:
+        for i, j, m in polled(rows):
             a, b, c = places[i], places[j], places[m]
             minor = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
             total += minor * ((a[2] + b[2] + c[2]) - 3 * z_unit)
@@ -177,7 +177,7 @@ def nearest_area(points: Points, triangles: IntArray, budget: Budget) -> tuple[f
     def ends_of(bits: int) -> tuple[Fraction, Fraction]:
         places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
         total = 0
-        for i, j, m in rows:
+        for i, j, m in polled(rows):
             a = places[i]
             total += isqrt(squared_length(cross(minus(places[j], a), minus(places[m], a))))
         budget.check()

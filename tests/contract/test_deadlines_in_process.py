@@ -313,6 +313,12 @@ def test_nine_million_crossings_end_in_every_stage(seconds: float) -> None:
     check_ends(lambda: cpu_after(partial(engine.union_all, bars), seconds, False))
 
 
+@pytest.mark.parametrize("seconds", [0.1, 0.3])
+def test_an_area_in_integers_ends_in_every_stage(seconds: float) -> None:
+    solid = spread_out()
+    check_ends(lambda: cpu_after(partial(engine.area, solid), seconds, False))
+
+
 @pytest.mark.parametrize("seconds", [0.1, 0.8, 2.2])
 def test_an_overlay_in_integers_ends_in_every_stage(seconds: float) -> None:
     """After the crossings come the faces, their labels and the rings."""
