@@ -29,7 +29,7 @@ from engine.collision.codes import DISJOINT, OVERLAPPING, RELATION, TOUCHING, UN
 from engine.collision.meshes import exact_regions as regions
 from engine.collision.meshes.contact_kinds import CONTAINED, FACE_FACE, STRENGTH
 from engine.collision.meshes.dual_traversal import PIERCING, SEEK_CROSSING, SEEK_OVERLAP, Contacts
-from engine.collision.meshes.exact_body import as_simplex
+from engine.collision.meshes.exact_body import ExactBody, as_simplex, value_at
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STILL, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, search_goal, unless_identity
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, state_at
@@ -40,15 +40,15 @@ from engine.solids.base import Solid
 from engine.types import FloatArray, IntArray, Relation
 
 
-def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
+def inspect_regions(pair: MeshPair, own: int, face: int, has_interior: bool) -> tuple[bool, bool]:
     """Return (overlaps, pierces) for a face in contact. overlaps: on one side of some region of the face both bodies
     are inside, so their open interiors intersect. pierces: the face has a point inside the other body; valid if
-    overlaps is False. own: 0 or 1, the body of the face."""
+    overlaps is False. own: 0 or 1, the body of the face; has_interior: False if that body has none."""
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
     if axis < 0:
         return False, False
-    side = regions.side_of_clean(body, face) if body.mesh.has_inside and pair.state(own, face) == STATE_CLEAN else 0
+    side = regions.side_of_clean(body, face) if has_interior and pair.state(own, face) == STATE_CLEAN else 0
     if side != 0:  # all that counts lies on one side: only faces that reach there cut it
         met = pair.contacts[pair.contacts[:, own] == face, 1 - own].tolist()
         is_above = side == sign_of(body.plane(face)[axis])
@@ -58,9 +58,9 @@ def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
                 return True, False
         return False, False  # a point of the face within the other body has both insides next to it
     pierces = False
-    for q in regions.regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
+    for q in regions.regions_of(body, face, [other, body] if has_interior else [other], pair.work.budget):
         theirs = regions.sides_at(other, q, axis)
-        if theirs.above or theirs.below:
+        if has_interior and (theirs.above or theirs.below):
             ours = regions.sides_at(body, q, axis)
             if (ours.above and theirs.above) or (ours.below and theirs.below):
                 return True, False
@@ -179,18 +179,18 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
     """Return OVERLAPPING or TOUCHING for a pair that meets, but of which no crossing proves OVERLAPPING. patches: by
     body, the sets of its connected faces without contact that lie inside the other body."""
     contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
-    both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
+    solid = [_may_have_interior(body) for body in pair.exact]
     for own in (0, 1):
         for patch in patches[own]:
-            if both and any(sides.above or sides.below for sides in pair.patch_sides(own, patch)):
+            if all(solid) and any(sides.above or sides.below for sides in pair.patch_sides(own, patch)):
                 if len(contacts):
                     return Collision(Relation.OVERLAPPING, pair.named())
                 return _containment(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
-        is_decided = not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside)
+        is_decided = not all(solid) and (piercing or not pair.work.witness or not solid[1 - own])
         for face in [] if is_decided else np.unique(contacts[:, own]).tolist():
             pair.work.budget.check()
-            overlaps, pierces = inspect_regions(pair, own, face)
+            overlaps, pierces = inspect_regions(pair, own, face, solid[own])
             if overlaps:
                 return Collision(Relation.OVERLAPPING, pair.named())
             piercing = piercing or pierces
@@ -201,6 +201,14 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
         return Collision(Relation.TOUCHING, pair.named(piercing=piercing))
     own = 0 if patches[0] else 1
     return _containment(pair, Relation.TOUCHING, own, patches[own][0], piercing=piercing)
+
+
+def _may_have_interior(body: ExactBody) -> bool:
+    """Return False for a surface, and for a closed mesh whose vertices all lie in the plane of its first face with
+    area: it has no interior, which else each region of its faces would show."""
+    plane = next((body.plane(face) for face in range(len(body.mesh.faces)) if body.axis(face) >= 0), (0, 0, 0, 0))
+    n_vertices = len(body.mesh.arrays.vertices)
+    return body.mesh.has_inside and any(value_at(plane, body.vertex(number)) for number in range(n_vertices))
 
 
 def _containment(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
