@@ -142,9 +142,7 @@ def collide_poses(
     one_pair.pair_function(first, second)
     if detail:
         one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)
-    if translations is None:
-        rotations, translations, deadline = read_poses(rotations, first.dimension, deadline, cancel)
-    poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
+    poses, deadline = read_poses(rotations, translations, first.dimension, workers, deadline, cancel)
     n_poses = len(poses.rotations)
     if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
         one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
@@ -196,13 +194,20 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
     return one_pair.collide_pair(first, second, (None, pose), work)
 
 
-def read_poses(poses: object, dimension: int, deadline: float | None, cancel: Cancel | None) -> tuple[Any, Any, Any]:
-    """Return rotations and translations of poses in any form, None for those of `Poses`, and the seconds left."""
-    if type(poses) is Poses:
-        return poses, None, deadline
-    with reading(deadline, cancel) as reader:
-        turns, moves = as_pose_arrays(poses, dimension)
-    return turns, moves, reader.left()
+def read_poses(
+    rotations: object, translations: object, dimension: int, workers: int | None, deadline: float | None,
+    cancel: Cancel | None,
+) -> tuple[PoseArrays, float | None]:  # fmt: skip
+    """Return poses in any form as checked arrays, and the seconds left."""
+    if translations is None:
+        only = rotations[0] if type(rotations) is list and len(rotations) == 1 else None
+        if type(only) is Pose and len(only.translation) == dimension:
+            return PoseArrays(only.rotation[None], only.translation[None], True), deadline
+        if type(rotations) is not Poses:
+            with reading(deadline, cancel) as reader:
+                rotations, translations = as_pose_arrays(rotations, dimension)
+            deadline = reader.left()
+    return PoseArrays(*as_poses(rotations, translations, dimension, workers), True), deadline
 
 
 def as_poses(

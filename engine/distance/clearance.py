@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
 from engine.collision.collide import Answers, collide_pair, pair_function, posed, read_pair
-from engine.collision.collide_poses import as_poses, batch_of, read_poses
+from engine.collision.collide_poses import batch_of, read_poses
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
@@ -271,9 +271,7 @@ def clearance_poses(
         first, second, deadline = read_pair(first, second, deadline, cancel)
     pair_function(first, second, "distance")
     least = None if at_least is None else checked_distance(at_least)
-    if translations is None:
-        rotations, translations, deadline = read_poses(rotations, first.dimension, deadline, cancel)
-    poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
+    poses, deadline = read_poses(rotations, translations, first.dimension, workers, deadline, cancel)
     n_poses = len(poses.rotations)
     answers = np.full(n_poses, np.nan if least != 0.0 else np.inf)
     with Budget(deadline, cancel) as budget:

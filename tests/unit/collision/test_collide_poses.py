@@ -51,9 +51,10 @@ def test_equals_one_by_one(index: int) -> None:
     moves[-4:] = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [4, 0, 0]]
     found, witnesses = collide_poses(first, second, turns, moves, witnesses=True)
     for item in range(60):
-        one = collide(first, second, second_pose=Pose(turns[item], moves[item]))
-        assert one.relation == found[item]
-        assert one.witness == witnesses[item]
+        pose = Pose(turns[item], moves[item])
+        one, listed = collide(first, second, second_pose=pose), collide_poses(first, second, [pose], witnesses=True)
+        assert one.relation == found[item] == listed[0][0]
+        assert one.witness == witnesses[item] == listed[1][0]
     assert len(set(found.tolist())) >= 2
     assert np.array_equal(found, collide_poses(first, second, turns, moves, workers=1))
     assert np.array_equal(found[7:29], collide_poses(first, second, turns[7:29], moves[7:29], workers=2))
