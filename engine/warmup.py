@@ -339,7 +339,8 @@ def _warm_bounds() -> None:
 
 def _warm_clearances() -> None:
     _collide_under_poses(_cube())  # order: its kernel takes the longest; others are stored meanwhile
-    clearance_poses(_cube(), _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
+    for body in (_cube(), HalfSpace([0, 0, 1], -9)):
+        clearance_poses(body, _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
 
 
 def _warm_cutting() -> None:

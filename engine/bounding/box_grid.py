@@ -107,7 +107,7 @@ def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> Int
     for block in _keys_of_pairs(low, high, budget.flag, BLOCK):
         budget.check()
         blocks.append(block)
-    # One sort of millions takes half a second: keys are sorted in ranges of about `BLOCK`, found by samples.
+    # One sort of millions takes half a second: keys are sorted in ranges of about `BLOCK`, as samples bound them.
     samples = np.sort(np.concatenate([block[::_SAMPLE] for block in blocks]))
     cuts = np.stack([np.searchsorted(block, samples[BLOCK // _SAMPLE :: BLOCK // _SAMPLE]) for block in blocks], axis=1)
     pairs = np.empty((sum(map(len, blocks)), 2), np.int64)

@@ -18,6 +18,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
 from engine.distance import forms
 from engine.distance.convex_nearest import fill_gaps_of_hulls, nearest_of_hulls, nearest_of_meshes
+from engine.distance.from_plane import fill_gaps_from_plane
 from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
@@ -26,6 +27,7 @@ from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.pose import Pose
+from engine.solids.primitives import HalfSpace
 from engine.types import Accuracy, BoolArray, FloatArray, Relation, read_only
 
 
@@ -185,7 +187,7 @@ def _measured(first: Solid, second: Solid, poses: Poses, least: float | None, bu
     if least == 0.0:
         return True
     planes = has_plane(first, second)
-    closed = (forms.between_form_and_plane if planes else forms.between_forms)(first, second, poses, least)
+    closed = (forms.between_body_and_plane if planes else forms.between_forms)(first, second, poses, least)
     if closed is not None:
         return closed
     nearest = None if planes or first.dimension == 2 else nearest_of_hulls(first, second, poses)
@@ -310,6 +312,8 @@ class _Batch:
         elif self.spread is not None and self.first.dimension == 3:
             some = PoseArrays(turns, moves, True)
             fill_gaps_of_hulls(self.first, self.second, some, least, answers[start:stop], self.budget)
+        elif isinstance(self.first, HalfSpace) and not isinstance(self.second, HalfSpace):
+            fill_gaps_from_plane(self.first, self.second, (turns, moves), least, answers[start:stop], self.budget)
         if not self.is_small and np.isnan(answers[start:stop]).any() and self.relate is not None:
             self.relate(start, stop)
         left = start + np.flatnonzero(np.isnan(answers[start:stop]))

@@ -11,6 +11,7 @@ their sum and its root together are below 32 u^2 of the root. Cases that the bou
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -287,6 +288,42 @@ def nearest_of_forms(
     return distance, faces if is_proven else -1, theirs
 
 
+@inline
+def is_power_of_two(x: float) -> bool:
+    """Return whether |x| is a power of two."""
+    return math.frexp(abs(x))[0] == 0.5
+
+
+@inline
+def sum_of_three(a: float, b: float, c: float) -> tuple[Wide, bool]:
+    """Return a + b + c, and whether it is exact."""
+    total, lost = two_sum(a, b)
+    total, lost_too = two_sum(total, c)
+    rest, lost = two_sum(lost, lost_too)
+    return Wide(*two_sum(total, rest)), lost == 0.0
+
+
+@inline
+def gap_of_values(value: Wide, square: Wide, slack: float, radius: float) -> float:
+    """Return the distance of a body from a half-space with the normal n, correctly rounded, 0.0 if they provably meet,
+    or UNSURE. value: of n . x + d at the body's extreme point, off by `slack`, where 0.0 means a normal with one
+    component, a power of two; square: n . n; radius: of a ball about that point. Eight operations of at most 16 u^2
+    each are below 128 u^2."""
+    if not (2.0**-400 < square.h < 2.0**400 and slack < 2.0**500):
+        return UNSURE
+    norm = root(square)
+    if slack == 0.0 and radius == 0.0 and not 0.0 < -value.h < 2.0**-500:
+        return max(-value.h / norm.h, 0.0) + 0.0
+    away = over(value, norm)
+    distance = less(Wide(-away.h, -away.low), Wide(radius, 0.0))
+    bound = 2.0 * slack / norm.h + 128.0 * U2 * abs(away.h) + 4.0 * U2 * abs(distance.h)
+    if distance.h < -bound:
+        return 0.0
+    if not (distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)):
+        return UNSURE
+    return distance.h
+
+
 @kernel
 def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> tuple[float, int, int]:
     """Return (distance, status, faces) of a posed box or ball and the half-space row (d + 1,): n, d with n . x + d >=
@@ -294,28 +331,31 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
 
     Distance: 0.0 if they meet, or UNSURE. Status: 0, or -1 if the points are not proven. Faces: of the body's nearest
     point, as bits 2 axis + side, the low ones of several. With v = dot(n, x) + d at the body's extreme point, off by
-    `slack`, distance = -v / |n| - radius, and foot = x - v n / dot(n, n). Eight operations of at most 16 u^2 each are
-    below 128 u^2."""
+    `slack`, distance = -v / |n| - radius (`gap_of_values`), and foot = x - v n / dot(n, n)."""
     w, d = workspace(_ROOM), move.shape[0]
     error = _place(form, turn, move, w, 0)
     value, square, terms, size, faces = Wide(row[d], 0.0), Wide(0.0, 0.0), abs(row[d]), 0.0, 0
+    axis, n_axes = 0, 0
     for k in range(d):
         side = 1 if row[k] > 0.0 else 0
+        if row[k] != 0.0:
+            axis, n_axes = k, n_axes + 1
         x = _wide(w, 4 * k + 2 * side)
         faces |= 1 << (2 * k + side)
         value, square = plus(value, times(product(row[k], 1.0), x)), plus(square, product(row[k], row[k]))
         terms, size = terms + abs(row[k] * x.h), size + abs(row[k])
     slack = 32.0 * U2 * terms + size * error + _PLANE_TINY
-    if not (2.0**-400 < square.h < 2.0**400 and terms < 2.0**500 and error < float("inf")):
-        return UNSURE, -1, faces
+    if n_axes == 1 and error == 0.0 and is_power_of_two(row[axis]):
+        x = _wide(w, 4 * axis + (2 if row[axis] > 0.0 else 0))
+        total, is_exact = sum_of_three(row[d], row[axis] * x.h, row[axis] * x.low)
+        if is_exact:
+            value, slack = total, 0.0
+    distance = UNSURE
+    if terms < 2.0**500 and error < float("inf"):
+        distance = gap_of_values(value, square, slack, form[RADIUS])
+    if not distance > 0.0:
+        return distance, -1, faces
     norm = root(square)
-    away = over(value, norm)
-    distance = less(Wide(-away.h, -away.low), Wide(form[RADIUS], 0.0))
-    bound = 2.0 * slack / norm.h + 128.0 * U2 * abs(away.h) + 4.0 * U2 * abs(distance.h)
-    if distance.h < -bound:
-        return 0.0, -1, faces
-    if not (distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)):
-        return UNSURE, -1, faces
     is_proven = True
     for k in range(d):
         x, n = _wide(w, 4 * k + (2 if row[k] > 0.0 else 0)), Wide(row[k], 0.0)
@@ -328,4 +368,4 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
             is_proven = is_proven and is_correctly_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
             bound = 128.0 * U2 * abs(outward.h) + 4.0 * U2 * abs(p.h) + _PLANE_TINY if form[RADIUS] > 0.0 else 0.0
         is_proven = is_proven and is_correctly_rounded(p.h, p.low, bound + error)
-    return distance.h, 0 if is_proven else -1, faces
+    return distance, 0 if is_proven else -1, faces

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from math import lcm
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -16,14 +17,15 @@ import numpy as np
 from engine.collision.exact_images import Vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.boundary import pulled_back
-from engine.collision.simple.closed_forms import FORMS, form_of
+from engine.collision.simple.closed_forms import FORMS, form_of, form_of_point
 from engine.compiling.jit import entry_of
 from engine.distance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
 from engine.distance.exact import Gap, Rational, ScaledGap
+from engine.distance.from_plane import corners_of, gaps_from_plane
 from engine.distance.outlines import nearest_under_poses
 from engine.distance.spreads import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.predicates.rational import minus, squared_length
-from engine.running.budget import UNLIMITED, Budget
+from engine.running.budget import UNLIMITED, Budget, polled
 from engine.solids.base import Solid
 from engine.solids.pose import motion_of
 from engine.solids.primitives import HalfSpace, Sphere
@@ -93,22 +95,31 @@ def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None
     return _answer(distance, points, names[faces], their_names[theirs])
 
 
-def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of a box or ball and an unposed half-space, in either order; given `least`, whether it is at
-    least that; None if unproven."""
+def between_body_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
+    """Return the clearance of a body and an unposed half-space, in either order; given `least`, whether it is at least
+    that; None if unproven."""
     is_second = isinstance(second, HalfSpace)
     plane, body = (second, first) if is_second else (first, second)
-    form = form_of(body)
-    if form is None or not isinstance(plane, HalfSpace) or poses[is_second] is not None:
+    if not isinstance(plane, HalfSpace) or poses[is_second] is not None or isinstance(body, HalfSpace):
         return None
-    points, motion = np.empty((2, body.dimension)), motion_of(poses[not is_second], body.dimension)
-    distance, status, faces = entry_of(nearest_of_plane)(plane.row, form, *motion, points)
+    form, motion, feature = form_of(body), motion_of(poses[not is_second], body.dimension), None
+    distance, status, points = UNSURE, -1, np.empty((2, body.dimension))
+    if form is not None:
+        distance, status, faces = entry_of(nearest_of_plane)(plane.row, form, *motion, points)
+        feature = _named(body, faces)
+    if distance == UNSURE and not isinstance(body, Sphere):
+        motions = motion[0][None], motion[1][None]
+        (distance,), (corner,) = (some.tolist() for some in gaps_from_plane(plane, body, motions, UNLIMITED.flag))
+        if distance > 0.0 and corner >= 0 and least is None:
+            vertices, numbers = corners_of(body)
+            _, status, _ = entry_of(nearest_of_plane)(plane.row, form_of_point(vertices[corner]), *motion, points)
+            feature = Feature("vertex", (int(numbers[corner]),))
     answer = _gap_from_closed_form(distance, least)
-    if answer is not None or not distance > 0.0 or status < 0 or least is not None:
+    if answer is not None or not distance > 0.0 or status < 0 or least is not None or feature is None:
         return answer
     if is_second:
-        return _answer(distance, points[::-1].copy(), _named(body, faces), PLANE)
-    return _answer(distance, points, PLANE, _named(body, faces))
+        return _answer(distance, points[::-1].copy(), feature, PLANE)
+    return _answer(distance, points, PLANE, feature)
 
 
 STILL2: Final = tuple(array[None] for array in motion_of(None, 2))
@@ -184,21 +195,20 @@ def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget
     """Return the nearest points of a half-space's plane and a body, and the body's vertex there as a feature; exact."""
     mesh, d = spread_of(body), body.dimension
     plane = image_half_space(space, poses[0])
-    best: tuple[Fraction, Vector, Feature] | None = None
     (_, weights, _), points = pulled_back(plane, poses[1]), mesh.arrays.vertices[:, :d]
     with np.errstate(all="ignore"):  # the rounding is that of `signs_of`
         values = points @ weights
         bounds = 2.0**-49 * (np.abs(points) @ np.abs(weights)) + 2.0**-1000 + 2.0**-1073 * np.abs(points).sum(axis=1)
         is_below = values + bounds < np.max(values - bounds)
-    for vertex in np.flatnonzero(~is_below).tolist():
-        budget.check()
-        point = image_point(mesh.arrays.vertices[vertex, :d].tolist(), poses[1])
-        value = value_at(plane, point)
-        if best is None or value >= best[0]:
-            triangle, corner = np.argwhere(mesh.arrays.triangles == vertex)[0].tolist()
-            feature = feature_of(body, mesh.arrays, triangle, corner)
-            if best is None or value > best[0] or feature.indices < best[2].indices:
-                best = value, point, feature
-    assert best is not None
-    value, point, feature = best
+    images = {}
+    for vertex in polled(np.flatnonzero(~is_below).tolist()):
+        images[vertex] = image_point(points[vertex].tolist(), poses[1])
+    exact = {vertex: value_at(plane, image) for vertex, image in polled(images.items())}
+    value = max(exact.values())
+    used, places = np.unique(mesh.arrays.triangles, return_index=True)
+    corners = dict(zip(used.tolist(), places.tolist()))
+    nearest = [vertex for vertex in exact if exact[vertex] == value]
+    names = {feature_of(body, mesh.arrays, *divmod(corners[vertex], 3)): vertex for vertex in polled(nearest)}
+    feature = min(names, key=attrgetter("indices"))
+    point = images[names[feature]]
     return tuple(x - value * n / squared_length(plane[0]) for x, n in zip(point, plane[0])), point, feature

@@ -20,13 +20,13 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, accuracy_of, check_has_detail, has_interior
 from engine.collision.convex_body import pool_bodies
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.result import Witness, Work
+from engine.collision.result import Clearance, Witness, Work
 from engine.collision.simple.closed_forms import form_of
 from engine.collision.simple.form_relations import N_NUMBERS
 from engine.compiling.jit import entry_of
 from engine.distance.clearance import checked_distance, has_plane
 from engine.distance.convex_gaps import gaps_of_pairs
-from engine.distance.forms import are_small, distances_under_poses, gap_of_planes
+from engine.distance.forms import are_small, between_body_and_plane, distances_under_poses, gap_of_planes
 from engine.distance.spreads import SpreadPair, in_space
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
@@ -403,6 +403,10 @@ def _distances_of_group(
         for item, ((i, j), place) in enumerate(zip(pairs.tolist(), places[:, 0].tolist())):
             budget.check()
             placed = (bodies.poses[i], bodies.poses[j]) if place else (None, None)
+            known = between_body_and_plane(first, second, placed, None)
+            if isinstance(known, Clearance) and known.distance != gap:
+                distances[item] = np.inf if known.distance > gap else known.distance if is_measured else 0.0
+                continue
             apart, _ = gap_of_planes(first, second, placed, budget)
             distances[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
         return distances

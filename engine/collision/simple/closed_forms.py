@@ -47,15 +47,21 @@ def form_of(solid: Solid) -> FloatArray | None:
     def build() -> FloatArray | None:
         d, form = solid.dimension, np.zeros(relations.N_NUMBERS)
         if isinstance(solid, Sphere):
-            form[:d] = form[relations.HIGH : relations.HIGH + d] = solid.center
-            form[relations.RADIUS :] = solid.radius, 1.0
-            return read_only(form)
+            return form_of_point(solid.center, float(solid.radius))
         if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
             form[:d], form[relations.HIGH : relations.HIGH + d] = solid.min, solid.max
             return read_only(form)
         return None
 
     return solid.prepared("form", build)
+
+
+def form_of_point(point: FloatArray, radius: float = 0.0) -> FloatArray:
+    """Return the numbers of a ball about a point."""
+    d, form = len(point), np.zeros(relations.N_NUMBERS)
+    form[:d] = form[relations.HIGH : relations.HIGH + d] = point
+    form[relations.RADIUS :] = radius, 1.0
+    return read_only(form)
 
 
 def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:

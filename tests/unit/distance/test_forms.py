@@ -12,7 +12,7 @@ import pytest
 from engine import Aabb, HalfSpace, Polyhedron, Pose, Sphere, clearance
 from engine.collision.result import Clearance, Feature
 from engine.distance.clearance import do_meet
-from engine.distance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
+from engine.distance.forms import MEETING, between_body_and_plane, between_forms, gap_of_planes
 from engine.distance.spreads import spread_pair
 from engine.running.budget import Budget
 from tests.unit.distance.makers import CORNERS, QUADS, turn
@@ -70,8 +70,8 @@ def test_half_spaces_are_what_rationals_say(size: float) -> None:
         normal = [rng.choice([0.0, 0.0, 1.0, -1.0, rng.uniform(-1.0, 1.0)]) for _ in range(d)]
         plane = HalfSpace(normal if any(normal) else [1.0, *normal[1:]], number(rng, size) - 8.0 * size)
         other, other_pose = body(rng, d, size), pose(rng, d, size)
-        found: Any = between_form_and_plane(plane, other, (None, other_pose), None)
-        mirrored: Any = between_form_and_plane(other, plane, (other_pose, None), None)
+        found: Any = between_body_and_plane(plane, other, (None, other_pose), None)
+        mirrored: Any = between_body_and_plane(other, plane, (other_pose, None), None)
         if found is None or found is MEETING:
             continue
         n_sure += 1
@@ -80,8 +80,8 @@ def test_half_spaces_are_what_rationals_say(size: float) -> None:
         assert said(found) == said(gap.clearance(features, d)), (plane, other, other_pose)
         assert (mirrored.distance, mirrored.features) == (found.distance, found.features[::-1])
         assert mirrored.points.tolist() == found.points.tolist()[::-1]
-        assert between_form_and_plane(plane, other, (None, other_pose), nextafter(found.distance, 0.0)) is True
-        assert between_form_and_plane(plane, other, (None, other_pose), nextafter(found.distance, 1e308)) is False
+        assert between_body_and_plane(plane, other, (None, other_pose), nextafter(found.distance, 0.0)) is True
+        assert between_body_and_plane(plane, other, (None, other_pose), nextafter(found.distance, 1e308)) is False
     assert n_sure > 50 or size > 1e150
 
 
