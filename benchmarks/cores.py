@@ -37,14 +37,14 @@ ROUNDS = 5
 CLIENTS = 16
 
 
-def _bodies(seed: int) -> tuple[engine.Polyhedron, list[engine.Solid], list[engine.Pose]]:
-    """Return a mesh of 1,280 faces, and a scene of 1,000 bodies."""
+def _bodies(seed: int, n: int = 1000) -> tuple[engine.Polyhedron, list[engine.Solid], list[engine.Pose]]:
+    """Return a mesh of 1,280 faces, and a scene of n bodies, as dense for every n."""
     mesh = engine.Polyhedron(*(lambda m: (m.vertices, m.faces))(bumpy_sphere("cores", seed, 3)))
     kinds = mesh, engine.Sphere([0, 0, 0], 0.8), engine.Aabb([-1, -0.5, -0.7], [1, 0.5, 0.7])
     draw = generator("cores/scene", seed)
-    moves = draw.uniform(-14.0, 14.0, (1000, 3))
-    poses = [engine.Pose(turn, move) for turn, move in zip(random_rotations(draw, 1000), moves)]
-    return mesh, [kinds[k % 3] for k in range(1000)], poses
+    moves = draw.uniform(-1.4, 1.4, (n, 3)) * np.cbrt(n)
+    poses = [engine.Pose(turn, move) for turn, move in zip(random_rotations(draw, n), moves)]
+    return mesh, [kinds[k % 3] for k in range(n)], poses
 
 
 def _discs(n: int, seed: int) -> list[engine.Polygon]:
@@ -89,6 +89,9 @@ def workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
     yield "segments, scene of 1,000", len(long), lambda workers: scene.clip_segments(long, workers=workers)
     spread = draw.uniform(-15, 15, (n(1e6), 3))
     yield "points, scene of 1,000", len(spread), lambda workers: scene.locate(spread, workers=workers)
+    _, solids, poses = _bodies(seed, n(4e4))
+    crowd = engine.Scene(solids, poses)
+    yield "pairs, scene of 40,000", len(solids), lambda workers: crowd.collide(witnesses=True, workers=workers)
     quads, window = star_rings(4, 2, n(1e6), seed), engine.Aabb([-1, -1], [1, 1])
     yield "quads, box", len(quads), lambda workers: engine.clip_polygons(quads, window, workers=workers)
     first, second = ([engine.Polygon(rings) for rings in each] for each in zip(*small("star", 10, n(1e5), seed)))
@@ -98,12 +101,14 @@ def workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
 
 
 def digest_of(answer: Any) -> str:
-    """Return a hash of all arrays of an answer."""
+    """Return a hash of all arrays of an answer, and of its witnesses."""
     named = [getattr(answer, field.name) for field in fields(answer)] if is_dataclass(answer) else [answer]
     summed = hashlib.sha256()
     for array in named:
         if isinstance(array, np.ndarray):
             summed.update(np.ascontiguousarray(array).tobytes())
+        elif isinstance(array, tuple):
+            summed.update(repr(array).encode())
     return summed.hexdigest()
 
 

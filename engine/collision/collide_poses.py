@@ -233,17 +233,21 @@ _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 
 
 def batch_of(
-    first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
+    first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers, own: PoseArrays | None = None
 ) -> Callable[[int, int], None] | None:
     """Return a task by which kernels fill the relations, and requested witnesses, of answers[start:stop], one entry a
-    pose of the second solid; UNSETTLED where they cannot decide. None if no kernel takes the pair."""
-    if {first.type, second.type} in _BALL_AND_MESH:
-        return _ball_batch(first, second, poses, answers)
+    pose of the second solid; UNSETTLED where they cannot decide. None if no kernel takes the pair. own: as many poses
+    of the first; then the batch of convex bodies is left out, which the caller asked."""
+    types = {first.type, second.type}
+    if types in _BALL_AND_MESH or (own is not None and types == {"sphere", "aabb"}):
+        return _ball_batch(first, second, poses, answers, own)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
     is_named = witnesses is not None  # then a search for contacts follows, which decides all relations
     has_detail = answers.details is not None
     is_coarse = answers.boolean or (is_named and first.dimension == 3)
-    batch = posed_batch(first, second, poses, relations, is_coarse, has_detail, budget, witnesses)
+    batch = None
+    if own is None:
+        batch = posed_batch(first, second, poses, relations, is_coarse, has_detail, budget, witnesses)
     if first.dimension == 2 or not (has_faces(first) and has_faces(second)):
         return batch
     a, b = mesh_body_of(first), mesh_body_of(second)
@@ -257,12 +261,12 @@ def batch_of(
         items: IntArray | slice = slice(start, stop)
         if batch is not None:  # disjoint pairs are decided, and without witnesses more
             items = start + np.flatnonzero(relations[items] != DISJOINT if is_named else relations[items] == UNSETTLED)
-        some = PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), True)
+        some, still = poses_at(poses, items), STILL if own is None else poses_at(own, items)
         rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)
         if not len(rows):
             return
         entry_of(relate_poses)(
-            a.arrays, b.arrays, STILL, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.contacts, 0, rows,
+            a.arrays, b.arrays, still, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.contacts, 0, rows,
             budget.flag,
         )  # fmt: skip
         budget.check()
@@ -279,23 +283,29 @@ def batch_of(
     return fill
 
 
+def poses_at(poses: PoseArrays, items: IntArray | slice) -> PoseArrays:
+    """Return some of the poses."""
+    return PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), poses.is_posed)
+
+
 _SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in RELATIONS), UNSETTLED], np.int8)
 """Relation of the two bodies in the other order, by relation; the last entry is UNSETTLED."""
 
 
 def _ball_batch(
-    first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
+    first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers, own: PoseArrays | None
 ) -> Callable[[int, int], None]:
     """Return a task that fills answers[start:stop] for a ball and a mesh, in either order, under these poses of the
-    second; UNSETTLED where floats prove nothing."""
+    second, and `own` of the first; UNSETTLED where floats prove nothing."""
     is_swapped = isinstance(first, Sphere)
     body, ball = (second, first) if is_swapped else (first, second)
     assert isinstance(ball, Sphere)
     mesh = mesh_body_of(body)
 
     def fill(start: int, stop: int) -> None:
-        moves = poses.rotations[start:stop], poses.translations[start:stop]
-        centers = centers_in_frame(ball, *((moves, None) if is_swapped else (None, moves)))
+        some = slice(start, stop)
+        moves = [poses_at(each, some)[:2] if each is not None and each.is_posed else None for each in (own, poses)]
+        centers = centers_in_frame(ball, *(moves[::-1] if is_swapped else moves))
         results = np.empty((stop - start, 2), np.int64)
         is_named = answers.witnesses is not None
         entry_of(relate_balls)(mesh.arrays, centers, float(ball.radius), is_named, results, answers.budget.flag)

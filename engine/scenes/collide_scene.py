@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 from typing import Any, ClassVar, Final, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.collision.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, accuracy_of, check_has_detail, has_interior
+from engine.collision.collide import NO_DETAIL, Answers, accuracy_of, check_has_detail, has_interior
 from engine.collision.convex_body import pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Witness, Work
@@ -31,6 +30,7 @@ from engine.distance.spreads import SpreadPair, in_space
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, run_chunks
+from engine.scenes.pair_groups import grouped, of_one_pose, runs_of, settle_pairs
 from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.columns import Columns
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
@@ -221,7 +221,7 @@ def collide_bodies(
         n_candidates += len(pairs)
         details = batches.details(pairs, relations) if detail else None
         answers = Answers(budget, boolean, relations, named, details)
-        _settle(bodies, pairs, answers, workers, progress)
+        settle_pairs(bodies, pairs, answers, workers, progress)
         works += answers.works
         near = None
         if gap is not None:
@@ -237,24 +237,6 @@ def collide_bodies(
                             distances if is_near else None)]  # fmt: skip
     accuracy = accuracy_of(n_candidates, n_open, works, "boxes" if only is None else "named pairs")
     return parts[0] if len(parts) == 1 else _concatenate(parts), accuracy
-
-
-def _settle(
-    bodies: SceneBodies, pairs: IntArray, answers: Answers, workers: int | None, progress: Progress | None
-) -> None:
-    """Decide those pairs (n, 2) of a block one by one that the batches left UNSETTLED, and write to `answers`."""
-    left = answers.left()
-    if progress is not None and len(left) < len(pairs):
-        progress(len(pairs) - len(left))
-
-    def pair_of(item: int) -> PlacedPair:
-        i, j = pairs[item].tolist()
-        return bodies.solids[i], bodies.solids[j], (bodies.poses[i], bodies.poses[j])
-
-    def task(start: int, stop: int) -> None:
-        answers.settle(left[start:stop], pair_of)
-
-    run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
 
 
 def _select_pairs(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:
@@ -276,7 +258,7 @@ def _concatenate(parts: list[ScenePairs]) -> ScenePairs:
     """Return the pairs of all sorted blocks as one sorted result."""
     columns = zip(*((part.first, part.second, part.relation, part.detail, part.distance) for part in parts))
     joined: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
-    order = np.lexsort((joined[1], joined[0]))
+    order = np.argsort(joined[0] * (int(joined[1].max(initial=0)) + 1) + joined[1], kind="stable")  # merges blocks
     ordered: list[Any] = [None if column is None else column[order] for column in joined]
     named = [witness for part in parts for witness in part.witnesses or ()]
     witnesses = None if parts[0].witnesses is None else tuple(named[item] for item in order.tolist())
@@ -358,10 +340,9 @@ def distances_below(
     if not gap:
         return distances
     places = pairs + 1
-    kinds, (i, j) = bodies.kinds[pairs], places.T
+    kinds = bodies.kinds[pairs]
     turns, moves = bodies.rotations, bodies.translations
-    equal = np.flatnonzero((moves[i] == moves[j]).all(axis=1))  # of equal poses, which are left out, as by `collide`
-    places[equal[(turns[i[equal]] == turns[j[equal]]).all(axis=(1, 2))]] = 0
+    places[of_one_pose(bodies, pairs)] = 0  # left out, as by `collide`
     forms = np.full((len(bodies.distinct), N_NUMBERS), np.nan)  # of solids that have none
     for kind in np.flatnonzero(np.bincount(kinds.ravel(), minlength=len(forms))).tolist():
         form = form_of(bodies.distinct[kind])
@@ -378,13 +359,10 @@ def distances_below(
 
     run_chunks(by_batch, len(pairs), budget=budget, workers=workers)
     still = np.flatnonzero(np.isnan(distances))
-    still = still[np.lexsort(kinds[still].T)]  # one query for all pairs of the same two solids
+    still, ends = grouped(still, kinds[still, 0] * len(forms) + kinds[still, 1])  # one query for the same two solids
 
     def by_search(start: int, stop: int) -> None:
-        some = kinds[still[start:stop]]
-        ends = [*(start + 1 + np.flatnonzero((some[1:] != some[:-1]).any(axis=1))).tolist(), stop]
-        for begin, end in pairwise([start, *ends]):
-            rows = still[begin:end]
+        for rows in runs_of(still, ends, start, stop):
             distances[rows] = _distances_of_group(bodies, pairs[rows], places[rows], gap, is_measured, budget)
 
     run_chunks(by_search, len(still), budget=budget, first_chunk=4, workers=workers)

@@ -12,7 +12,7 @@ from engine.polygon_overlay import stripes
 
 QUESTIONS = (
     "points, mesh", "points, polygon", "collide", "clearance", "segments, box", "segments, mesh", "segments, scene",
-    "points, scene", "quads, box", "overlay_batch", "union",
+    "points, scene", "pairs, scene", "quads, box", "overlay_batch", "union",
 )  # fmt: skip
 
 

@@ -145,7 +145,7 @@ def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
     descent: dual.Descent, contacts: dual.Contacts, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill rows (n, N_COLUMNS) int64 (columns above) for n poses of the second body; still: the only pose of the first.
+    """Fill rows (n, N_COLUMNS) int64 (columns above) for n poses of the second body; still: n, or one, of the first.
 
     seek: goal that ends a search early (SEEK_...). n_named: number of contacts from which the witness is chosen; 0:
     only relations are written; DETAIL: only the details of the contacts. descent, contacts: work space; pairs with more
@@ -157,7 +157,9 @@ def relate_poses(
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
-        place, is_apart = dual.place_bodies(first, still, 0, second, poses, item, descent)
+        place, is_apart = dual.place_bodies(
+            first, still, min(item, len(still.rotations) - 1), second, poses, item, descent
+        )
         s = dual.Search(first, second, place, descent, seek, contacts, flag)
         how, n_pairs, at = dual.PAUSED, n_known, dual.START
         if n_known > 0 or is_apart:

@@ -22,6 +22,7 @@ from engine import (
     Pose,
     Relation,
     Sphere,
+    Surface,
     Triangle,
     UnsupportedSolidError,
     WrongDimensionError,
@@ -113,6 +114,37 @@ def test_ten_thousand_boxes_in_a_lattice_touch_their_neighbours() -> None:
     neighbours = sum((n - (dx != 0)) * (n - (dy != 0)) * (n - (dz != 0)) for dx, dy, dz in np.ndindex(3, 3, 3)) - n**3
     assert len(pairs.first) == neighbours // 2 == report.n_items
     assert (pairs.relation == Relation.TOUCHING).all()
+
+
+@pytest.mark.parametrize("options", [{}, {"boolean": True}, {"witnesses": True}, {"detail": True}])
+def test_groups_of_pairs_are_decided_as_one_by_one(options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meshes that are not convex, balls and boxes, in contact too, posed, unposed and under the identity."""
+    wedge = Polyhedron(
+        [[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [0, 0, 1], [2, 0, 1], [2, 1, 1], [1, 1, 1],
+         [1, 2, 1], [0, 2, 1]],
+        [[5, 4, 3, 2, 1, 0], [6, 7, 8, 9, 10, 11], *([k, (k + 1) % 6, (k + 1) % 6 + 6, k + 6] for k in range(6))],
+    )  # fmt: skip
+    sheet = Surface([[0, 0, 0], [3, 0, 0], [0, 3, 0], [3, 3, 1]], [[0, 1, 2], [1, 3, 2]])
+    kinds, rng = (
+        [wedge, sheet, Sphere([0.5, 0.5, 0.5], 0.5), Aabb([0, 0, 0], [1, 1, 2]), wedge],
+        np.random.default_rng(8),
+    )
+    kinds = kinds[:1] + kinds[2:] if "detail" in options else kinds
+    solids = [kinds[k % len(kinds)] for k in range(160)]
+    places = np.round(rng.uniform(0, 9, (160, 3)) * 2) / 2
+    poses = [
+        None if k % 9 == 0 else Pose(TURN if k % 2 else EYE, [0, 0, 0] if k % 11 == 0 else place)
+        for k, place in enumerate(places)
+    ]
+    answers = collide_scene(solids, poses, workers=3, **options)
+    assert len(set(answers.relation.tolist())) > 1 or "boolean" in options
+    monkeypatch.setattr("engine.scenes.pair_groups._FEW", 10**9)
+    alone = collide_scene(solids, poses, **options)
+    assert as_list(answers) == as_list(alone)
+    assert answers.witnesses == alone.witnesses
+    for i, j, relation in as_list(answers)[::7]:
+        one = collide(solids[i], solids[j], first_pose=poses[i], second_pose=poses[j])
+        assert one.relation == relation or "boolean" in options
 
 
 def test_pairs_found_in_several_blocks_are_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
