@@ -31,12 +31,14 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from engine.compiling.jit import allocating_kernel, entry_of, inline, kernel
 from engine.running.budget import Budget
+from engine.running.parallel import run_chunks
 from engine.types import FlagArray, FloatArray, IntArray
 
 _FASTEST: Final = 1e300
@@ -72,6 +74,8 @@ _SAMPLE: Final = 1 << 10
 """Every so-many-th pair of a block is a sample, when many blocks are sorted in ranges."""
 _FEW, _FEWEST = 96, 256
 """Fewer than _FEW boxes: all pairs are compared. From _FEWEST boxes on a grid is built; between, a sweep."""
+_PARTED, _N_PARTS = 1 << 14, 64
+"""Boxes from which on parts of them may go to several threads, and how many parts."""
 _LARGE: Final = 64
 _ENLARGED: Final = 1.0 + 2.0**-20
 _MOST_PER_CELL: Final = 48
@@ -88,25 +92,22 @@ boxes are sorted by their first coordinate, for a sweep.
 
 
 def pairs_of_boxes(
-    low: FloatArray, high: FloatArray, flag: FlagArray, block: int = BLOCK, n_left: int | None = None
-) -> Iterator[IntArray]:
+    low: FloatArray, high: FloatArray, budget: Budget, block: int = BLOCK, n_left: int | None = None,
+    workers: int | None = 1,
+) -> Iterator[IntArray]:  # fmt: skip
     """Yield the pairs ``(n_pairs, 2)``, first < second, of closed boxes ``(n, d)`` that have a common point, in blocks.
 
     n_left: if given, only pairs of one of the first `n_left` boxes and one of the others.
     Each block is sorted, and has about `block` pairs, or all pairs of one box if these are more; a later block may have
-    smaller indices. Stops early, with an invalid block, once `flag` (1,) uint8 is set: the caller checks it after each
-    block.
+    smaller indices. Raises: as `Budget.check`.
     """
-    for keys in _keys_of_pairs(low, high, flag, block, n_left):
+    for keys in _keys_of_pairs(low, high, budget, block, n_left, workers):
         yield np.stack([keys // len(low), keys % len(low)], axis=1)
 
 
 def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
     """Return the pairs of `pairs_of_boxes` as one sorted array (n_pairs, 2). Raises: as `Budget.check`."""
-    blocks = [np.zeros(0, np.int64)]
-    for block in _keys_of_pairs(low, high, budget.flag, BLOCK):
-        budget.check()
-        blocks.append(block)
+    blocks = [np.zeros(0, np.int64), *_keys_of_pairs(low, high, budget, BLOCK)]
     # One sort of millions takes half a second: keys are sorted in ranges of about `BLOCK`, as samples bound them.
     samples = np.sort(np.concatenate([block[::_SAMPLE] for block in blocks]))
     cuts = np.stack([np.searchsorted(block, samples[BLOCK // _SAMPLE :: BLOCK // _SAMPLE]) for block in blocks], axis=1)
@@ -121,18 +122,40 @@ def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> Int
 
 
 def _keys_of_pairs(
-    low: FloatArray, high: FloatArray, flag: FlagArray, block: int, n_left: int | None = None
-) -> Iterator[IntArray]:
-    """Yield the pairs of `pairs_of_boxes` in sorted blocks, each pair as the key first * n + second."""
+    low: FloatArray, high: FloatArray, budget: Budget, block: int, n_left: int | None = None,
+    workers: int | None = 1,
+) -> Iterator[IntArray]:  # fmt: skip
+    """Yield the pairs of `pairs_of_boxes` in sorted blocks, each pair as the key first * n + second. Parts of the boxes
+    are passed over side by side, each up to its share of a block at a time."""
     n_boxes = len(low)
+    budget.check()
     grid = _sweep_grid(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
-    grid = grid or (_build_grid(low, high) if n_boxes >= _FEWEST else None) or _sorted_along_axis(low, high)
-    start, enough = 0, max(block, 1)
-    keys = np.empty(min(enough, n_boxes * n_boxes // 2) + n_boxes, np.int64)  # one box meets fewer than there are
-    while start < n_boxes:  # bound: start grows
-        n_pairs, start = entry_of(_collect_pairs)(grid, start, enough, -1 if n_left is None else n_left, keys, flag)
-        if n_pairs:
-            yield np.sort(keys[:n_pairs])
+    grid = grid or (_build_grid(low, high, budget, workers) if n_boxes >= _FEWEST else None)
+    grid = grid or _sorted_along_axis(low, high)
+    n_parts = 1 if n_boxes < _PARTED or workers == 1 else _N_PARTS
+    parts = list(pairwise(n_boxes * part // n_parts for part in range(n_parts + 1)))
+    while parts:  # bound: each turn ends a part, or lists pairs
+        keys = _keys_of_parts(grid, parts, max(block // n_parts, 1), -1 if n_left is None else n_left, budget, workers)
+        if len(keys):
+            yield keys
+        parts = [part for part in parts if part[0] < part[1]]
+
+
+def _keys_of_parts(
+    grid: CornerGrid, parts: list[tuple[int, int]], enough: int, n_left: int, budget: Budget, workers: int | None
+) -> IntArray:
+    """Return the sorted keys of pairs of the boxes of each part (start, stop), about `enough` a part; `parts` then
+    holds what is left of them."""
+    n_boxes, listed = len(grid.numbers), [np.zeros(0, np.int64)] * len(parts)
+
+    def collect(first: int, last: int) -> None:
+        keys = np.empty(min(enough, n_boxes * n_boxes // 2) + n_boxes, np.int64)  # one box meets fewer than there are
+        for part in range(first, last):
+            n, start = entry_of(_collect_pairs)(grid, *parts[part], enough, n_left, keys, budget.flag)
+            listed[part], parts[part] = np.sort(keys[:n]), (start, parts[part][1])
+
+    run_chunks(collect, len(parts), budget=budget, first_chunk=1, workers=workers)
+    return listed[0] if len(listed) == 1 else np.sort(np.concatenate(listed), kind="stable")
 
 
 @np.errstate(all="ignore")
@@ -154,7 +177,7 @@ def _sweep_grid(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) 
 
 
 @np.errstate(all="ignore")
-def _build_grid(low: FloatArray, high: FloatArray) -> CornerGrid | None:
+def _build_grid(low: FloatArray, high: FloatArray, budget: Budget, workers: int | None) -> CornerGrid | None:
     """Return the `CornerGrid` of boxes (n, d), or None where a sweep is faster or coordinates are not finite."""
     n_boxes, dimension = low.shape
     extent = np.empty(n_boxes)
@@ -173,10 +196,17 @@ def _build_grid(low: FloatArray, high: FloatArray) -> CornerGrid | None:
         return None
     counts = last.astype(np.int64) + 3  # a rim of one cell on either side
     row, layer = int(counts[0]), int(counts[0] * counts[1])
-    boxes, numbers, cells = np.zeros((n_boxes, 6)), np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
+    boxes, numbers, cells = np.empty((n_boxes, 6)), np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
     starts = np.zeros(layer * int(counts[2]) + 1, np.int32)
     grid = CornerGrid(boxes, numbers, cells, starts, row, layer)
-    return None if _sort_into_cells(low, high, extent, widest, least, width, grid) > _MOST_PER_CELL * n_boxes else grid
+    if _sort_into_cells(low, extent, widest, least, width, grid) > _MOST_PER_CELL * n_boxes:
+        return None
+
+    def fill(start: int, stop: int) -> None:
+        entry_of(_fill_boxes)(low, high, numbers[start:stop], boxes[start:stop])
+
+    run_chunks(fill, n_boxes, budget=budget, workers=workers)
+    return grid
 
 
 @kernel
@@ -204,12 +234,11 @@ def _corner_ranges(low: FloatArray, extent: FloatArray, widest: float, span: Flo
 
 @allocating_kernel
 def _sort_into_cells(
-    low: FloatArray, high: FloatArray, extent: FloatArray, widest: float, least: FloatArray, width: FloatArray,
-    grid: CornerGrid,
-) -> int:  # fmt: skip
-    """Fill the arrays of `grid`, zero on entry: boxes of extent <= `widest` by the cell of their low corner, then the
-    others. least, width (3,): corner of the first cell, and size of a cell. Returns the sum of (number of boxes)^2 over
-    the cells."""
+    low: FloatArray, extent: FloatArray, widest: float, least: FloatArray, width: FloatArray, grid: CornerGrid
+) -> int:
+    """Fill the arrays of `grid` but the boxes, starts zero on entry: those of extent <= `widest` by the cell of their
+    low corner, then the others. least, width (3,): corner of the first cell, and size of a cell. Returns the sum of
+    (number of boxes)^2 over the cells."""
     starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
     cells = np.empty(n_boxes, np.int64)
     n_small = 0
@@ -237,9 +266,17 @@ def _sort_into_cells(
             place = n_small + n_large
             n_large += 1
         grid.numbers[place], grid.cells[place] = box, cell
-        for axis in range(dimension):
-            grid.boxes[place, axis], grid.boxes[place, 3 + axis] = low[box, axis], high[box, axis]
     return n_sharing
+
+
+@kernel
+def _fill_boxes(low: FloatArray, high: FloatArray, numbers: IntArray, boxes: FloatArray) -> None:
+    """Fill boxes (n, 6) with low and high of the boxes of these numbers, 0 on an axis that they lack."""
+    for place in range(numbers.shape[0]):
+        for axis in range(3):
+            is_there = axis < low.shape[1]
+            boxes[place, axis] = low[numbers[place], axis] if is_there else 0.0
+            boxes[place, 3 + axis] = high[numbers[place], axis] if is_there else 0.0
 
 
 @inline
@@ -273,16 +310,16 @@ def _append_run(
 
 @kernel
 def _collect_pairs(
-    grid: CornerGrid, start: int, enough: int, n_left: int, keys: IntArray, flag: FlagArray
+    grid: CornerGrid, start: int, end: int, enough: int, n_left: int, keys: IntArray, flag: FlagArray
 ) -> tuple[int, int]:
-    """Write keys first * n + second of the pairs of boxes from index `start` of the grid on, until there are at least
-    `enough` keys. n_left: as in `_append_run`. Returns the number of keys, and the index to go on from; (0, n) if
-    the flag is set."""
+    """Write keys first * n + second of the pairs of boxes start .. end - 1 of the grid with later ones, until there are
+    at least `enough` keys. n_left: as in `_append_run`. Returns the number of keys, and the index to go on from;
+    (0, end) if the flag is set."""
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer
     n_boxes, n_small, n_pairs = numbers.shape[0], int(starts[-1]), 0
-    for box in range(start, n_boxes):
+    for box in range(start, end):
         if flag[0] != 0:
-            return 0, n_boxes
+            return 0, end
         if n_pairs >= enough:
             return n_pairs, box
         cell = grid.cells[box]
@@ -300,4 +337,4 @@ def _collect_pairs(
             n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], n_left, keys, n_pairs)
             cell += row
         n_pairs = _append_run(boxes, numbers, box, n_small, n_boxes, n_left, keys, n_pairs)
-    return n_pairs, n_boxes
+    return n_pairs, end

@@ -39,7 +39,7 @@ from engine.solids.bounds import boxes_of_polygons
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose, motions_of
 from engine.solids.poses import Poses
-from engine.solids.primitives import Aabb
+from engine.solids.primitives import Aabb, Sphere
 from engine.solids.registry import own_box
 from engine.solids.shapes import as_solid
 from engine.types import BoolArray, FloatArray, Int8Array, IntArray
@@ -58,7 +58,9 @@ class PairBatches:
 
     def __init__(self, distinct: Sequence[Solid]) -> None:
         self.distinct, self.is_planar = distinct, len(distinct) > 0 and distinct[0].dimension == 2
-        self.are_boxes = np.array([isinstance(solid, Aabb) for solid in distinct], np.bool_)
+        self.are_boxes, self.are_balls = (
+            np.array([isinstance(solid, kind) for solid in distinct], np.bool_) for kind in (Aabb, Sphere)
+        )
         self.cached_pool: tuple[Any, IntArray] | None = None
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
@@ -134,7 +136,11 @@ class SceneBatches:
         """Return the relation codes (n,) of pairs (n, 2) of body indices, UNSETTLED where no kernel decides. boolean,
         detail, witnesses: as in `PairBatches.task`."""
         result, bodies = np.full(len(pairs), UNSETTLED, np.int8), self.bodies
-        relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, result)
+
+        def relate_boxes(start: int, stop: int) -> None:
+            relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs[start:stop], result[start:stop])
+
+        run_chunks(relate_boxes, len(pairs), budget=budget, workers=workers)
         if (result == UNSETTLED).any():
             kinds, poses = np.append(np.int64(0), bodies.kinds), PoseArrays(bodies.rotations, bodies.translations, True)
             task = self.pairs.task(kinds, poses, pairs + 1, result, boolean, detail, budget, witnesses)

@@ -25,7 +25,7 @@ def welded(
     with np.errstate(over="ignore"):  # boxes and distances beyond the largest double
         low, high = (np.nextafter(spots + sign * distance / 2, sign * np.inf) for sign in (-1, 1))
         root = np.arange(len(points))
-        for block in pairs_of_boxes(low, high, budget.flag):
+        for block in pairs_of_boxes(low, high, budget):
             budget.check()
             first, second = used[block].T
             is_near = np.sqrt(np.square(points[first] - points[second]).sum(axis=1)) <= distance

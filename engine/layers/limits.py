@@ -57,7 +57,7 @@ class Limits:
         first n_left boxes and one of the others. n_bytes: memory charged to the budget for a pair."""
         blocks = [np.zeros((0, 2), np.int64)]
         with self.budget() as budget:
-            for pairs in pairs_of_boxes(low, high, budget.flag, BLOCK, n_left) if len(low) else ():
+            for pairs in pairs_of_boxes(low, high, budget, BLOCK, n_left) if len(low) else ():
                 budget.check()
                 blocks.append(pairs if is_chosen is None else pairs[is_chosen(pairs)])
                 budget.take(n_bytes * len(blocks[-1]))

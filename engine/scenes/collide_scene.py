@@ -20,8 +20,7 @@ from engine.collision.collide import NO_DETAIL, Answers, accuracy_of, check_has_
 from engine.collision.convex_body import pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Witness, Work
-from engine.collision.simple.closed_forms import form_of
-from engine.collision.simple.form_relations import N_NUMBERS
+from engine.collision.simple.form_relations import HIGH, IS_BALL, N_NUMBERS, RADIUS
 from engine.compiling.jit import entry_of
 from engine.distance.clearance import checked_distance, has_plane
 from engine.distance.convex_gaps import gaps_of_pairs
@@ -211,7 +210,7 @@ def collide_bodies(
     parts: list[ScenePairs] = []
     works: list[Work] = []
     n_candidates = n_open = 0
-    for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget):
+    for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget, workers):
         budget.check()
         relations = np.full(len(pairs), UNSETTLED, np.int8)
         named: list[Witness | None] | None = [None] * len(pairs) if witnesses else None
@@ -275,7 +274,12 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
 
 
 def _candidates(
-    bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
+    bodies: SceneBodies,
+    low: FloatArray,
+    wanted: IntArray | None,
+    skipped: IntArray | None,
+    budget: Budget,
+    workers: int | None,
 ) -> Iterator[IntArray]:
     """Yield sorted blocks of pairs (m, 2) whose boxes intersect (broad phase). low: low corners of the boxes, moved
     outward by the gap. wanted, skipped: keys first * n + second to which pairs are restricted, and that are left out;
@@ -283,8 +287,11 @@ def _candidates(
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
-    high = bodies.high
-    for pairs in pairs_of_boxes(low, high, budget.flag) if wanted is None else _meeting(low, high, np.unique(wanted)):
+    if wanted is None:
+        blocks = pairs_of_boxes(low, bodies.high, budget, workers=workers)
+    else:
+        blocks = _meeting(low, bodies.high, np.unique(wanted))
+    for pairs in blocks:
         yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
 
 
@@ -343,10 +350,11 @@ def distances_below(
     kinds = bodies.kinds[pairs]
     turns, moves = bodies.rotations, bodies.translations
     places[of_one_pose(bodies, pairs)] = 0  # left out, as by `collide`
-    forms = np.full((len(bodies.distinct), N_NUMBERS), np.nan)  # of solids that have none
-    for kind in np.flatnonzero(np.bincount(kinds.ravel(), minlength=len(forms))).tolist():
-        form = form_of(bodies.distinct[kind])
-        forms[kind] = forms[kind] if form is None else form
+    low, high = np.moveaxis(bodies.own.boxes, 1, 0)
+    forms, d, balls = np.zeros((len(bodies.distinct), N_NUMBERS)), bodies.dimension, batches.pairs.are_balls
+    forms[:, :d], forms[:, HIGH : HIGH + d], forms[:, RADIUS] = low, high, bodies.own.radii
+    forms[:, IS_BALL] = balls
+    forms[~balls & ~(batches.pairs.are_boxes & (low < high).all(axis=1))] = np.nan
     pool, convex = _NONE, np.full(len(forms), -1, np.int64)
     if bodies.dimension == 3 and (bodies.is_posed[pairs].any() or np.isnan(forms[kinds, 0]).any()):
         pool, convex = batches.pairs.pool(budget)

@@ -122,7 +122,7 @@ def crossings(
     at_junctions = _pairs_at(faces, at_edges)
     blocks = [np.zeros((0, 2), np.int64)]
     low, high = (pick(pick(a, b), c) for pick in (np.minimum, np.maximum))
-    for block in pairs_of_boxes(low, high, budget.flag, 1 << 14) if len(solid_faces) else ():
+    for block in pairs_of_boxes(low, high, budget, 1 << 14) if len(solid_faces) else ():
         budget.check()
         pairs = solid_faces[block]
         n_common = np.empty(len(pairs), np.int8)

@@ -9,8 +9,6 @@ from engine.bounding.box_grid import all_pairs_of_boxes, cell_of, make_axis, pai
 from engine.errors import CancelledError
 from engine.running.budget import Budget, Cancel
 
-FLAG = np.zeros(1, np.uint8)
-
 
 def all_pairs(blocks) -> list[list[int]]:
     return np.concatenate([np.empty((0, 2), np.int64), *blocks]).tolist()
@@ -44,15 +42,30 @@ def test_the_pairs_are_those_that_meet(kind: str, dimension: int) -> None:
     if kind == "infinite":
         low[5], high[5], low[6] = -np.inf, np.inf, -np.inf
     expected = brute_force(low, high)
-    assert all_pairs(pairs_of_boxes(low, high, FLAG)) == expected
-    blocks = list(pairs_of_boxes(low, high, FLAG, 100))
+    assert all_pairs(pairs_of_boxes(low, high, Budget())) == expected
+    blocks = list(pairs_of_boxes(low, high, Budget(), 100))
     assert all(block.tolist() == sorted(block.tolist()) for block in blocks)
     assert sorted(all_pairs(blocks)) == expected
 
 
-def test_a_raised_flag_ends_it() -> None:
-    low = np.random.default_rng(0).uniform(0, 10, (500, 3))
-    assert all_pairs(pairs_of_boxes(low, low + 1, np.ones(1, np.uint8))) == []
+@pytest.mark.parametrize("workers", [1, 2, 3, 16])
+def test_parts_of_many_boxes_by_threads(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("engine.bounding.box_grid._PARTED", 300)
+    rng = np.random.default_rng(11)
+    low = rng.uniform(0, 12, (1500, 3))
+    high = low + rng.uniform(0.2, 1.2, low.shape)
+    expected = brute_force(low, high)
+    assert all_pairs(pairs_of_boxes(low, high, Budget(), workers=workers)) == expected
+    blocks = list(pairs_of_boxes(low, high, Budget(), 640, workers=workers))
+    assert all(block.tolist() == sorted(block.tolist()) for block in blocks)
+    assert sorted(all_pairs(blocks)) == expected
+
+
+def test_a_cancelled_call_ends() -> None:
+    low, cancel = np.random.default_rng(0).uniform(0, 10, (500, 3)), Cancel()
+    cancel.set()
+    with Budget(cancel=cancel) as budget, pytest.raises(CancelledError):
+        list(pairs_of_boxes(low, low + 1, budget))
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -62,7 +75,7 @@ def test_every_pair_of_few_once(dimension: int, block: int) -> None:
     low = rng.integers(0, 8, (40, dimension)).astype(float)
     high = low + rng.integers(0, 3, low.shape)
     low[5], high[6], low[7], high[7] = -np.inf, np.inf, -np.inf, np.inf
-    blocks = list(pairs_of_boxes(low, high, FLAG, block))
+    blocks = list(pairs_of_boxes(low, high, Budget(), block))
     assert sorted(all_pairs(blocks)) == brute_force(low, high)
     assert all(len(part) < block + len(low) for part in blocks)
 
