@@ -14,7 +14,7 @@ import argparse
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -151,8 +151,10 @@ def requests_a_second(seed: int, seconds: float = 3.0) -> dict[str, dict[str, fl
 
 
 def over_dask(seed: int) -> dict[str, dict[str, float]]:
-    """Return the seconds of batches by worker processes of Dask, one thread each; `here`: one thread without Dask."""
+    """Return the seconds of batches by worker processes of Dask, one thread each, and their CPU seconds, with
+    those of client and scheduler; `here`: one thread without Dask."""
     from distributed import Client, LocalCluster
+    from psutil import Process
 
     from engine import distributed
 
@@ -164,7 +166,7 @@ def over_dask(seed: int) -> dict[str, dict[str, float]]:
         "poses, meshes of 1k": lambda: engine.collide_poses(mesh, mesh, turns, moves, workers=1),
     }
     expected = {name: question() for name, question in here.items()}
-    result = {name: {"here": _least(question)} for name, question in here.items()}
+    result = {name: dict(zip(("here", "here, CPU"), _least(question))) for name, question in here.items()}
     for workers in (1, 2, 4):
         cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
         with cluster, Client(cluster) as client:
@@ -174,12 +176,20 @@ def over_dask(seed: int) -> dict[str, dict[str, float]]:
             )
             for name, question in zip(here, there):
                 assert np.array_equal(question(), expected[name])
-                result[name][str(workers)] = _least(question)
+                there_too = [Process(nanny.pid) for nanny in cluster.workers.values()]
+                result[name] |= zip((f"{workers}", f"{workers}, CPU"), _least(question, there_too))
     return result
 
 
-def _least(question: Callable[[], Any]) -> float:
-    return min(clocked(question)[0] for _ in range(3))
+def _least(question: Callable[[], Any], others: Sequence[Any] = ()) -> tuple[float, float]:
+    """Return the least wall and CPU seconds of a question, that of other processes included."""
+    wall, cpu = [], []
+    for _ in range(5):
+        before = sum(sum(each.cpu_times()[:2]) for each in others)
+        took = clocked(question)
+        wall.append(took[0])
+        cpu.append(took[1] + sum(sum(each.cpu_times()[:2]) for each in others) - before)
+    return min(wall), min(cpu)
 
 
 def _simulate(given: argparse.Namespace) -> int:

@@ -54,6 +54,8 @@ def settle_pairs(
     left = answers.left()
     if progress is not None and len(left) < len(pairs):
         progress(len(pairs) - len(left))
+    if not len(left):
+        return
     left, ends = grouped(left, _keys_of(bodies, pairs[left], answers))
 
     def pair_of(item: int) -> PlacedPair:

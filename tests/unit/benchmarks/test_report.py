@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import errors, page, workloads
+from benchmarks import errors, machine, page, workloads
 from benchmarks.contenders import Prepared
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.contest import Contender, Contest, Row, Size, run_contest, sketch
-from benchmarks.fields import tasks
+from benchmarks.fields import costs, tasks
 
 pytest.importorskip("gmpy2", reason="exact answers need gmpy2")
 
@@ -103,6 +104,37 @@ def test_a_body_too_large_to_be_shown_is_drawn_by_some_of_its_faces() -> None:
         range(len(found["first"]["vertices"]))
     )
     assert 200 < len(found["second"]["rings"][0]) <= 300
+
+
+@pytest.mark.parametrize(("n_cores", "runs"), [(2, 0), (4, 0), (8, 1)])
+def test_the_report_has_the_table_of_many_cores(
+    n_cores: int, runs: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That of the machine with most cores; one with more than four measures its own, once."""
+
+    def store(speed_up: float, cores: int) -> None:
+        rows = {"points": {"speed_up": {"1": 1.0, "default": speed_up}}}
+        path = tmp_path / f"p-{cores}-cores" / "cores.json"
+        path.parent.mkdir()
+        path.write_text(json.dumps({"facts": {"cores": cores, "processor": "p", "commit": "c"}, "threads": rows}))
+
+    monkeypatch.setattr(machine, "RESULTS", tmp_path)
+    monkeypatch.setattr(machine, "cores", lambda: n_cores)
+    monkeypatch.setattr(machine, "processor", lambda: "p")
+    measured: list[list[str]] = []
+
+    def measure(words: list[str]) -> None:
+        measured.append(words)
+        store(7.5, n_cores)
+
+    monkeypatch.setattr(costs.many_cores, "main", measure)
+    store(3.5, 3)
+    for _ in range(2):
+        figure = costs._cores()
+    assert len(measured) == runs
+    assert (figure.name, figure.raw["rows"]) == (
+        ("8 cores against one", {"points": 7.5}) if runs else ("3 cores against one", {"points": 3.5})
+    )
 
 
 def test_ring_areas() -> None:
