@@ -20,6 +20,7 @@ from engine.scenes.bodies import order_of
 from engine.scenes.ends import Exact, LoosePieces, ScenePieces, merge_parts, sort_pieces
 from engine.scenes.near_boxes import MOST_MET, scratch_for
 from engine.scenes.placements import Placements
+from engine.scenes.posed_contacts import cut_posed
 from engine.scenes.segment_kernels import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.decide_then_cut import FEW
@@ -29,6 +30,7 @@ from engine.segment_clipping.profiles import ExactPiece, clip_exactly, exact_pie
 from engine.solids.base import Solid
 from engine.solids.checks import is_ready
 from engine.solids.pose import Pose
+from engine.solids.registry import row_of
 from engine.types import OPEN, UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray, read_only
 
 _BYTES: Final = 400
@@ -258,32 +260,34 @@ def _cut(
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
             placed = scene.placed_exactly(body, end - begin, budget)
-            pieces, rational, is_known = _on_body(read_only(segments[items]), *placed, budget)
+            pieces, rational, are_long = _on_body(read_only(segments[items]), *placed, budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:
                 budget.take(_BYTES * m)
-                are_long = np.full(m, UNDECIDED)
-                if is_known:  # contacts that round alike are one in kernels; an end of a segment may be none
-                    are_exact = ~np.isin(pieces.source, rational) if len(rational) else True
-                    differ, own = pieces.t[:, 0] != pieces.t[:, 1], pieces.faces < 0
-                    are_long = np.where(are_exact & (differ | (own[:, 0] == own[:, 1])), differ, UNDECIDED)
                 parts[group] = LoosePieces(items[pieces.source], np.full(m, body), are_long, *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
     return [parts[group] for group in sorted(parts)]
 
 
-def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
+def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, IntArray]:
     """Return the pieces of segments (n, 2, dim) within one placed solid, sorted by source and t; the indices of the
-    segments that took rational arithmetic, all if it is unknown which; and whether the pieces of the others come from
-    boundary_cut.py."""
+    segments that took rational arithmetic, all if it is unknown which; and of pieces whether they are longer than a
+    point (`LoosePieces`)."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
+    if pose is not None and row_of(solid).hits is not None:
+        return cut_posed(segments, shape, pose, budget)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)
         pieces, _, n_rational = plan.cut(segments, shape, plan, budget, 1, None)
-        return pieces, every[: n * bool(n_rational)], False
+        return pieces, every[: n * bool(n_rational)], np.full(len(pieces.source), UNDECIDED)
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
         locator = None if n <= FEW else locator_of(solid).chosen(n, budget)
-        return *clip_chunk(segments, 0, n, shape, locator, budget), True
-    return clip_exactly(segments, every, solid, pose, budget), every, False
+        pieces, rational = clip_chunk(segments, 0, n, shape, locator, budget)
+        # contacts that round alike are one in kernels; an end of a segment may be none
+        are_exact = ~np.isin(pieces.source, rational) if len(rational) else True
+        differ, own = pieces.t[:, 0] != pieces.t[:, 1], pieces.faces < 0
+        return pieces, rational, np.where(are_exact & (differ | (own[:, 0] == own[:, 1])), differ, UNDECIDED)
+    pieces = clip_exactly(segments, every, solid, pose, budget)
+    return pieces, every, np.full(len(pieces.source), UNDECIDED)

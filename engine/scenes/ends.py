@@ -46,6 +46,8 @@ def compare_ends(first: int, second: int, given: Any, segments: FloatArray, word
     (i, side), (j, other) = (first // 2, first % 2), (second // 2, second % 2)
     if i == j and are_long[i] != UNDECIDED:
         return (side - other) * int(are_long[i])
+    if i != j and bodies[i] == bodies[j]:
+        return 1 if i > j else -1  # they are in order, and apart
     face, its = faces[i, side], faces[j, other]
     a, b = array_at(_row_of(words, bodies[i]), (4,), np.int64), array_at(_row_of(words, bodies[j]), (4,), np.int64)
     if face >= 0 and its >= 0:

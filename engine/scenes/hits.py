@@ -13,14 +13,15 @@ import numpy as np
 from engine.compiling.jit import entry_of, kernel
 from engine.containment.methods.rational_locate import to_body_frame, to_world_frame
 from engine.errors import UnsupportedSolidError
-from engine.predicates.error_free import two_diff
+from engine.predicates.error_free import U2, two_diff
+from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.joining import join_columns
 from engine.running.parallel import Progress, check_options
 from engine.scenes.near_boxes import near_pairs, scratch_for
 from engine.scenes.placements import Placements
 from engine.scenes.posed_cut import _turned
-from engine.scenes.table import _frame_of
+from engine.scenes.table import frame_of
 from engine.segment_clipping import hits as on_one
 from engine.segment_clipping.hit_contacts import fill_normals
 from engine.segment_clipping.hit_search import ANY, FIRST
@@ -34,6 +35,8 @@ from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 _PAIRS: Final = 1 << 18
 """Pairs of lines and bodies that are looked at together."""
 _BYTES_OF_PAIR: Final = 40
+_ASIDE: Final = read_only(np.array([0.53, 0.46, 0.71]))
+"""A direction along which a ray leaves most bodies soon, across no plane that many of them have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -120,7 +123,7 @@ def _on_bodies(lines: Lines, scene: Placements, keep: int, budget: Budget, worke
                 continue
             solid, pose = scene.placed(body)
             make: Any = row_of(solid).hits
-            target, some = make(solid, budget), _lines_on(lines, items, pose)
+            target, some = make(solid, budget), lines_on(lines, items, pose)
             columns, left = find(some, target, keep, budget, workers)
             is_open[items[left]] = True
             if keep == ANY:
@@ -160,7 +163,7 @@ def _near(lines: Lines, scene: Placements, budget: Budget) -> Iterator[tuple[Int
         budget.take(-_BYTES_OF_PAIR * room)
 
 
-def _lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:
+def lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:
     """Return some lines in the frame of a body."""
     rows = read_only(lines.rows[items])
     if pose is None:
@@ -172,22 +175,24 @@ def _lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:
         start = to_body_frame(p, pose)
         return start, [y - x for x, y in zip(start, to_body_frame(end, pose))]
 
-    frame = _frame_of(pose)
-    heads, tails, blurs = np.full(rows.shape, np.inf), np.zeros(rows.shape), np.zeros(len(rows))
+    frame, n = frame_of(pose), len(rows)
+    placed, blurs, way = np.zeros((n + 1, 4, 3)), np.full(n + 1, np.inf), (pose.rotation @ _ASIDE).astype(np.float32)
     if frame is not None:  # else: numbers out of range, which stay open
-        entry_of(to_frame)(rows, lines.is_ray, read_only(frame), heads, tails, blurs)
-    return Lines(heads, tails, blurs, lines.is_ray, exact)
+        entry_of(to_frame)(rows, lines.is_ray, way.astype(np.float64), frame, placed, blurs)
+    # a ray aside: its vector, the same in the frame, the bound, and the tail
+    numbers = [*pose.rotation, pose.translation, way, placed[n, 1], np.full(3, blurs[n]), placed[n, 3]]
+    return Lines(rows, read_only(placed[:n]), read_only(blurs[:n]), lines.is_ray, read_only(np.array(numbers)), exact)
 
 
 def _with_faces(columns: Any, target: Target, pose: Pose | None, budget: Budget) -> Hits:
     """Return hits on a body with faces and unit normals under its pose."""
     if pose is None:
         return on_one.with_faces(columns, target, target.normals[columns[3]], budget)
-    frame, (triangles, rows) = _frame_of(pose), np.unique(columns[3], return_inverse=True)
+    frame, (triangles, rows) = frame_of(pose), np.unique(columns[3], return_inverse=True)
     normals = np.full((len(triangles), 3), np.nan)
     if frame is not None:
         elements = read_only(target.mesh.elements[triangles])
-        entry_of(fill_normals)(elements, read_only(frame), budget.flag, normals)
+        entry_of(fill_normals)(elements, frame, budget.flag, normals)
         budget.check()
     return on_one.with_faces(
         columns, target, normals[rows.ravel()], budget, lambda corners: [to_world_frame(x, pose) for x in corners]
@@ -229,20 +234,25 @@ def _merged(parts: list[Hits], bodies: list[IntArray], starts: dict[int, Any], k
 
 @kernel
 def to_frame(
-    lines: FloatArray, is_ray: bool, frame: FloatArray, heads: FloatArray, tails: FloatArray, blurs: FloatArray
+    lines: FloatArray, is_ray: bool, aside: FloatArray, frame: FloatArray, placed: FloatArray, blurs: FloatArray
 ) -> None:
-    """Set heads and tails (n, 2, 3), double-doubles, to the start and the vector of lines (n, 2, 3) in the frame (3, 7)
-    of a pose, and blurs (n,) to a bound on the error of their coordinates."""
-    for i in range(lines.shape[0]):
-        p, q = lines[i, 0], lines[i, 1]
+    """Set placed (n + 1, 4, 3) to the start and the vector of lines (n, 2, 3) in the frame (3, 7) of a pose, heads and
+    tails of double-doubles, the last to those of a ray along `aside` (3,), and blurs (n + 1,) to a bound on the error of
+    their coordinates, infinite where they are out of range. Tiny ones may underflow: far below the bound."""
+    n = lines.shape[0]
+    for i in range(n + 1):
+        p, q = lines[max(i - 1, 0), 0], aside
+        if i < n:
+            p, q = lines[i, 0], lines[i, 1]
         at, blur = _turned(frame, (
             two_diff(p[0], frame[0, 6]), two_diff(p[1], frame[1, 6]), two_diff(p[2], frame[2, 6])
         ))  # fmt: skip
         way = (q[0], 0.0), (q[1], 0.0), (q[2], 0.0)
-        if not is_ray:
+        if not is_ray and i < n:
             way = two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2])
         along, along_blur = _turned(frame, way)
-        blurs[i] = max(blur, along_blur)
+        size = max(abs(at[0][0]), abs(at[1][0]), abs(at[2][0]), abs(along[0][0]), abs(along[1][0]), abs(along[2][0]))
+        blurs[i] = max(blur, along_blur) + 8.0 * U2 * size if SMALLEST <= size <= LARGEST else np.inf
         for k in range(3):
-            heads[i, 0, k], tails[i, 0, k] = at[k]
-            heads[i, 1, k], tails[i, 1, k] = along[k]
+            placed[i, 0, k], placed[i, 2, k] = at[k]
+            placed[i, 1, k], placed[i, 3, k] = along[k]

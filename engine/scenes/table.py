@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from typing import Any
+from functools import lru_cache
+from typing import Any, Final
 
 import numpy as np
 
@@ -19,7 +20,10 @@ from engine.solids.mesh import Polyhedron
 from engine.solids.pose import Pose
 from engine.solids.primitives import rows_in_space, rows_of
 from engine.solids.registry import BodyKind, own_box, row_of
-from engine.types import FloatArray, IntArray
+from engine.types import FloatArray, IntArray, read_only
+
+_FRAMES: Final = 1 << 12
+"""Poses of which the frame is cached."""
 
 
 class Table:
@@ -30,7 +34,7 @@ class Table:
     | kind | `BodyKind` |
     | number | planes: how many; mesh: whether it is closed |
     | address | planes: (k, 4); ball: (7,) centre in the world as double-doubles, radius; mesh: `MESH_WORDS` |
-    | frame | address of `_frame_of`, 0 for none |
+    | frame | address of `frame_of`, 0 for none |
 
     like: the table of bodies of which these are a subset; both share the data of solids.
     """
@@ -71,7 +75,7 @@ class Table:
             row[2] = ball.ctypes.data
             return BodyKind.BALL if _are_safe([head for head, _ in doubles]) else BodyKind.OTHER
         if pose is not None and not pose.is_identity:
-            frame = _frame_of(pose)
+            frame = frame_of(pose)
             if frame is None:
                 return BodyKind.OTHER
             self._own.append(frame)
@@ -106,7 +110,8 @@ def _words_of(solid: Any) -> IntArray:
     return words
 
 
-def _frame_of(pose: Pose) -> FloatArray | None:
+@lru_cache(_FRAMES)
+def frame_of(pose: Pose) -> FloatArray | None:
     """Return the frame of a pose (3, 7): by axis a row of R^-1 as double-doubles, then the translation; planar poses
     fix z. None if numbers are out of the kernels' range."""
     entries, below = exact_inverse(pose)
@@ -114,7 +119,7 @@ def _frame_of(pose: Pose) -> FloatArray | None:
     frame[2, 4] = 1.0
     frame[:n, : 2 * n] = [np.ravel([nearest_pair(entry, below) for entry in row]) for row in entries]
     frame[:n, 6] = pose.translation
-    return frame if _are_safe(frame[:, ::2].ravel().tolist()) else None
+    return read_only(frame) if _are_safe(frame[:, ::2].ravel().tolist()) else None
 
 
 def _are_safe(numbers: Iterable[float]) -> bool:

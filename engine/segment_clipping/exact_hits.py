@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.predicates.rational import Number, common_integers, cross, dot, minus, nearest_with_root
 from engine.segment_clipping.exact_pieces import LAST, Contact, contacts_of
-from engine.segment_clipping.hit_search import ACROSS, ALONG, END, RIM, TOUCH
+from engine.segment_clipping.hit_rows import ACROSS, ALONG, END, RIM, TOUCH
 from engine.segment_clipping.profiles import LARGEST, near_boxes
 from engine.types import FlagArray, FloatArray
 

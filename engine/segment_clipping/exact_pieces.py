@@ -64,6 +64,9 @@ def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
     if any(_cross(u, w)):
         return None  # parallel, not on one line
     length = dot(u, u)
+    if not length:  # case: a point
+        is_on = not any(_cross(v, w)) and 0 <= -dot(v, w) <= dot(v, v) and (any(v) or not any(w))
+        return (FIRST, LAST, True) if is_on else None
     ends = sorted(Fraction(dot(minus(end, p), u), length) for end in (a, b))
     first, last = max(ends[0], FIRST), min(ends[1], LAST)
     return (first, last, True) if first <= last else None

@@ -67,7 +67,7 @@ def _ratio(top: Triple, bottom: Triple) -> tuple[float, float, bool]:
 
 
 @inline
-def _places(corners: Any, signs: Any, turn: int, k: int, is_forth: bool) -> tuple[int, int]:
+def places_of(corners: Any, signs: Any, turn: int, k: int, is_forth: bool) -> tuple[int, int]:
     """Return where a line enters and leaves a triangle that it meets: corners 0 .. 2 or sides 3 .. 5, the same if it
     touches a corner. signs: sides of the corners; is_forth: whether the line goes up axis k."""
     enter, leave = -1, -1
@@ -147,7 +147,7 @@ def flat_stretch(line: Line, a: Point3, b: Point3, c: Point3) -> Stretch:
     )  # fmt: skip
     if min(signs) > 0 or max(signs) < 0:
         return _NONE
-    enter, leave = _places(corners, signs, turn, k, way[k][0] > 0.0)
+    enter, leave = places_of(corners, signs, turn, k, way[k][0] > 0.0)
     first, last = _pass_at(enter, line, k, i, j, corners), _pass_at(leave, line, k, i, j, corners)
     of_first, of_last = _sign(first.top) * _sign(first.bottom), _sign(last.top) * _sign(last.bottom)
     first_beyond = last_beyond = -1

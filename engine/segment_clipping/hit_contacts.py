@@ -10,8 +10,8 @@ sign or the rounding of a quotient open, the vector products are expansions, and
 vector product from a compressed expansion is within 8 u^2 of itself, which `dot` takes for the 16 u^2 m of `minor`.
 
 Under a pose p and e are double-doubles, off by `blur` at most: each of the six products of a determinant, with factors
-below M, moves by 3 blur (M + blur)^2, all of them by less than `_BLUR` blur (M + blur)^2. A sign that this leaves open,
-and a triangle without area, are DEGENERATE: exact_hits.py decides. Signs that are proven leave t
+below M, moves by 3 blur (M + blur)^2, all of them by less than `_BLUR` blur (M + blur)^2. A sign that this leaves open
+is decided in exact_lines.py, a triangle without area in exact_hits.py. Signs that are proven leave t
 open by as much as v and w are, relative to w: far ends and earlier hits are compared with that in mind.
 
 Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997. Changed: all is exact.
@@ -45,8 +45,11 @@ from engine.segment_clipping.on_boundary.triangle_contacts import _side_when_per
 from engine.segment_clipping.pieces import Triple
 from engine.types import FlagArray, FloatArray, Point3
 
-Line = namedtuple("Line", "start way blur p q is_ray is_placed")
-"""start, way: p and e as double-doubles; p, q: points whose line has the same direction, exactly, unless is_placed."""
+Line = namedtuple("Line", "start way blur p q is_ray is_placed turned")
+"""start, way: p and e as double-doubles; p, q: points whose line has the same direction, exactly; with is_placed
+as they were before the pose, q of a ray its direction. turned: 0, or BACK, ASIDE: a ray from a segment's start."""
+BACK, ASIDE = 1, 2
+"""Directions of a ray from the start of a segment: away from its end, and any other."""
 Hit = namedtuple("Hit", "code t low first second third")
 """A contact: Kind.APART, DEGENERATE (open), IN_PLANE (the line lies in the triangle's plane, see flat_hits.py), or its
 code; its parameter t, the nearest double, and what is beyond it (within 2^-67 |t|); its barycentrics."""

@@ -16,10 +16,11 @@ from engine.predicates.rational import nearest_float
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.joining import join_columns
 from engine.running.parallel import Progress, check_options, run_chunks
-from engine.segment_clipping import hit_search
+from engine.segment_clipping import hit_rows
 from engine.segment_clipping.exact_hits import ExactHit, exact_hits, exact_normal, near_elements
 from engine.segment_clipping.hit_contacts import fill_normals
-from engine.segment_clipping.hit_search import ALL, ANY, FIRST, MET, NEAR, Rows, find_hits
+from engine.segment_clipping.hit_rows import Rows
+from engine.segment_clipping.hit_search import ALL, ANY, FIRST, MET, NEAR, find_hits
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, boundary_of
 from engine.solids.accepted import LinesLike, SolidLike
 from engine.solids.checks import as_point_groups, shown
@@ -36,8 +37,9 @@ _FEW: Final = 256
 _ROOM: Final = 128
 _BYTES: Final = 400
 """Memory counted for a hit, in its part and joined."""
-_NO_LINES: Final = read_only(np.zeros((0, 2, 3)))
+_NO_LINES: Final = read_only(np.zeros((0, 4, 3)))
 _NO_BLURS: Final = read_only(np.zeros(0))
+_NO_POSE: Final = read_only(np.zeros((0, 3)))
 NO_FRAME: Final = read_only(np.zeros((0, 7)))
 
 
@@ -45,31 +47,31 @@ class Lines(NamedTuple):
     """Lines as `find_hits` reads them, and a function that gives the exact start and vector of one."""
 
     rows: FloatArray
-    tails: FloatArray
+    placed: FloatArray
     blurs: FloatArray
     is_ray: bool
+    pose: FloatArray
     exact: Callable[[int], tuple[Any, Any]]
 
-    def part(self, rows: Any = None) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-        """Return what kernels read of some of the lines, of all for None."""
-        if rows is None:
-            return self.rows, self.tails, self.blurs, self.is_ray
-        placed = rows if len(self.tails) else slice(None)
-        return read_only(self.rows[rows]), read_only(self.tails[placed]), read_only(self.blurs[placed]), self.is_ray
+    def part(self, rows: IntArray) -> Lines:
+        """Return what kernels read of some of the lines."""
+        some = rows if len(self.placed) else slice(None)
+        placed, blurs = read_only(self.placed[some]), read_only(self.blurs[some])
+        return self._replace(rows=read_only(self.rows[rows]), placed=placed, blurs=blurs)
 
 
 class HitKind(IntEnum):
     """How a line and a surface meet in a hit; the first line that is true, from the bottom, decides."""
 
-    ACROSS = hit_search.ACROSS
+    ACROSS = hit_rows.ACROSS
     """A point where the line changes sides: moved by infinitesimals, it crosses an odd number of triangles there."""
-    TOUCH = hit_search.TOUCH
+    TOUCH = hit_rows.TOUCH
     """A point where it crosses an even number: a corner or an edge seen from outside, two coincident sheets."""
-    RIM = hit_search.RIM
+    RIM = hit_rows.RIM
     """A point on a rim: a side whose pair of corners, by coordinates, an odd number of triangles has."""
-    END = hit_search.END
+    END = hit_rows.END
     """A point at the start of the line, or at the far end of a segment."""
-    ALONG = hit_search.ALONG
+    ALONG = hit_rows.ALONG
     """A stretch longer than a point: the line runs in a face, or along an edge."""
 
 
@@ -168,9 +170,8 @@ def hits(
 
     Accuracy: decisions exact for every finite input; numbers are nearest doubles, each on its own, zero as +0.0.
 
-    Cost: a tree, unit normals and rims are prepared once, then O(log faces + hits) a line. Lines that run
-    along a face take some 2 us, faces without area, numbers beyond 2^120 and, under poses, lines in the plane of a face
-    that they may meet exact arithmetic, some 0.2 ms.
+    Cost: a tree, unit normals and rims are prepared once, then O(log faces + hits) a line. A face along which a line
+    runs takes some 1 us, under poses 3 us; faces without area and numbers beyond 2^120 rationals, some 0.2 ms.
 
     References
     ----------
@@ -232,15 +233,14 @@ def plain_lines(lines: FloatArray, is_ray: bool) -> Lines:
         p, q = lines[item].tolist()
         return p, q if is_ray else [Fraction(y) - Fraction(x) for x, y in zip(p, q)]
 
-    return Lines(lines, _NO_LINES, _NO_BLURS, is_ray, exact)
+    return Lines(lines, _NO_LINES, _NO_BLURS, is_ray, _NO_POSE, exact)
 
 
 def search(
-    lines: tuple[FloatArray, FloatArray, FloatArray, bool], target: Target, keep: int, budget: Budget,
-    workers: int | None, progress: Progress | None = None,
-) -> tuple[Rows, FlagArray]:  # fmt: skip
+    lines: Lines, target: Target, keep: int, budget: Budget, workers: int | None, progress: Progress | None = None
+) -> tuple[Rows, FlagArray]:
     """Return the hits that the kernel decides, and the state of each line (`find_hits`)."""
-    *arrays, is_ray = lines
+    arrays, is_ray, pose, _ = lines[:3], *lines[3:]
     n, parts, state = len(arrays[0]), dict[int, list[Rows]](), np.empty(len(arrays[0]), np.uint8)
 
     def task(first: int, last: int) -> None:
@@ -252,11 +252,11 @@ def search(
                 np.empty(m),
                 np.empty(m),
                 np.empty(m, np.int64),
-                np.empty(m, np.int8),
+                np.empty(m, np.int64),
                 np.empty((m, 3)),
             )
             entry_of(find_hits)(
-                *(arrays if last - first == n else [array[first:last] for array in arrays]), is_ray, target.mesh,
+                *(arrays if last - first == n else [array[first:last] for array in arrays]), is_ray, pose, target.mesh,
                 target.rims, keep, room, budget.flag, out, state[first:last], reached,
             )  # fmt: skip
             budget.check()
@@ -275,7 +275,7 @@ def search(
     every = [part for first in sorted(parts) for part in parts[first]]
     if not every:
         none, whole = np.zeros(0), np.zeros(0, np.int64)
-        return Rows(whole, none, none, whole, np.zeros(0, np.int8), np.zeros((0, 3))), state
+        return Rows(whole, none, none, whole, whole, np.zeros((0, 3))), state
     return Rows(*join_columns(every, budget, workers)), state
 
 
@@ -284,7 +284,7 @@ def find(
 ) -> tuple[Any, IntArray]:
     """Return (source, t, t_end, triangle, kind, barycentric), with ANY bools, and the lines that took the exact
     fallback."""
-    columns, state = search(lines.part(), target, keep, budget, workers, progress)
+    columns, state = search(lines, target, keep, budget, workers, progress)
     left = np.flatnonzero(state == OPEN)
     exact = exact_on(lines, left, target, budget) if len(left) else {}
     if keep == ANY:
@@ -306,7 +306,7 @@ def columns_of(rows: list[tuple[int, ExactHit]]) -> list[Any]:
         np.array([nearest_float(each.t) for _, each in rows], np.float64),
         np.array([nearest_float(each.t_end) for _, each in rows], np.float64),
         np.array([each.triangle for _, each in rows], np.int64),
-        np.array([each.kind for _, each in rows], np.int8),
+        np.array([each.kind for _, each in rows], np.int64),
         np.array([[nearest_float(x) for x in each.weights] for _, each in rows], np.float64).reshape(-1, 3),
     ]
 
@@ -337,4 +337,4 @@ def with_faces(
     for each in {*triangle[are_open].tolist()} if are_open.any() else ():
         budget.check()
         normal[triangle == each] = exact_normal(image(target.mesh.elements[each].tolist()))
-    return Hits(source, t, t_end, target.mesh.faces[triangle], triangle, kind, barycentric, normal)
+    return Hits(source, t, t_end, target.mesh.faces[triangle], triangle, kind.astype(np.int8), barycentric, normal)

@@ -12,7 +12,7 @@ from engine.compiling.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.joining import join_columns
-from engine.types import FloatArray
+from engine.types import FloatArray, IntArray
 
 Triple = tuple[float, float, float]
 End = tuple[float, float, float, int]
@@ -57,6 +57,11 @@ def first_of(pieces: Pieces, m: int) -> Pieces:
     return Pieces(pieces.source[:m], pieces.ends[:, :m], pieces.t[:m], pieces.faces[:m])
 
 
+def take_rows(pieces: Pieces, rows: IntArray) -> Pieces:
+    """Return the pieces with indices ``rows``."""
+    return Pieces(pieces.source[rows], pieces.ends[:, rows], pieces.t[rows], pieces.faces[rows])
+
+
 def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -> Pieces:
     """Return pieces of the exact fallback as arrays, -0.0 replaced by 0.0. sources: the segment of each."""
     ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, dimension) + 0.0
@@ -71,8 +76,7 @@ def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -
 def in_order_of_source(parts: Sequence[Pieces]) -> Pieces:
     """Merge several sets of pieces by source; the pieces of one source must be in one set, in order."""
     pieces = joined(parts)
-    order = np.argsort(pieces.source, kind="stable")
-    return Pieces(pieces.source[order], pieces.ends[:, order], pieces.t[order], pieces.faces[order])
+    return take_rows(pieces, np.argsort(pieces.source, kind="stable"))
 
 
 @merged

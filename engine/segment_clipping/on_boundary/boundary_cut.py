@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.compiling.jit import allocating, allocating_kernel, called, inline
+from engine.compiling.jit import allocating, allocating_kernel, called, inline, kernel
 from engine.segment_clipping.on_boundary.contacts import (
     CROSSED,
     GROUP,
@@ -77,7 +77,26 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
         if n == UNSURE:
             return UNSURE
     sort_crossings(cuts, n)
-    return n
+    return n if _mark_points(segments, item, boundary.elements, cuts, n) else UNSURE
+
+
+@inline
+def _mark_points(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> bool:
+    """Mark those of n sorted contacts of segment ``item`` that are not in the point of the one before with `Bit.LATER`;
+    return False if some that round alike may be different points."""
+    begin = 0
+    for place in range(1, n):
+        i, first = cuts.order[place], cuts.order[begin]
+        if cuts.t[i] != cuts.t[first]:
+            begin = place
+            cuts.codes[i] |= Bit.LATER
+            continue
+        met, code, other, its = cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]
+        if not are_same_point(elements, met, code, other, its) and not are_at_one_parameter(
+            segments, item, elements, met, code, other, its
+        ):
+            return False
+    return True
 
 
 @called
@@ -111,27 +130,15 @@ class Before(IntEnum):
     ANYWHERE = -1
     """Not needed: no span is off the boundary."""
     UNKNOWN = -2
-    """Undecided: different contacts round alike."""
+    """Undecided."""
 
 
 @inline
-def _location_before(
-    segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int
-) -> int:
-    """Return the location (`Before`) of the perturbed line before the first of n sorted contacts of segment ``item``;
-    UNKNOWN also if contacts that round alike may be different points. of_p, of_q: locations of the segment's ends, of_q
-    as `emit_touching` takes it."""
-    begin, turns = 0, False
-    for place in range(n):
-        i, first = cuts.order[place], cuts.order[begin]
-        if cuts.t[i] != cuts.t[first]:
-            begin = place
-        elif i != first:
-            met, code, other, its = cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]
-            if not are_same_point(elements, met, code, other, its) and not are_at_one_parameter(
-                segments, item, elements, met, code, other, its
-            ):
-                return Before.UNKNOWN
+def _location_before(cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
+    """Return the location (`Before`) of the perturbed line before the first of n sorted contacts of a segment. of_p,
+    of_q: locations of its ends, of_q as `emit_touching` takes it."""
+    turns = False
+    for i in cuts.order[:n]:
         turns ^= (cuts.codes[i] & Bit.CROSSES != 0) & (decode_place(cuts.codes[i]) != Place.END)
     if of_p != 0:
         return int(of_p > 0)
@@ -158,19 +165,14 @@ def _write_end(
 
 @called
 def emit_touching(
-    segments: FloatArray, item: int, source: int, ends: Int8Array, elements: FloatArray, cuts: Crossings, n: int,
-    out: Pieces, row: int,
+    segments: FloatArray, item: int, source: int, of_points: int, ends: Int8Array, cuts: Crossings, n: int, out: Pieces,
+    row: int,
 ) -> int:  # fmt: skip
-    """Write the pieces between n contacts, at most n + 1, to `out` from `row` on; return the next row, or UNSURE.
-    source: number of the segment. ends: (2,) int8 locations of the segment's ends; the second counts only if the first
-    is on the boundary, and may be INSIDE_BEFORE or OUTSIDE_BEFORE."""
-    is_in, turned, n_along, is_open, place = (
-        _location_before(segments, item, elements, cuts, n, ends[0], ends[1]),
-        0,
-        0,
-        ends[0] > 0,
-        0,
-    )
+    """Write the pieces between n contacts, marked with `Bit.LATER`, at most n + 1, to `out` from `row` on; return the
+    next row, or UNSURE. source, of_points: what is written as source of pieces that are longer than a point, and of the
+    others. ends: (2,) int8 locations of the segment's ends; the second counts only if the first is on the boundary, and
+    may be INSIDE_BEFORE or OUTSIDE_BEFORE."""
+    is_in, turned, n_along, is_open, place = _location_before(cuts, n, ends[0], ends[1]), 0, 0, ends[0] > 0, 0
     if is_in == Before.UNKNOWN:
         return UNSURE
     if is_open:
@@ -178,7 +180,7 @@ def emit_touching(
         put_own_end(out, row, 0, segments, item, segments.shape[2] == 2)
     while place < n:  # bound: each turn passes a contact
         first, best, face = cuts.order[place], 2 * Bit.ALONG, -1
-        while place < n and cuts.t[cuts.order[place]] == cuts.t[first]:
+        while place < n and (cuts.order[place] == first or cuts.codes[cuts.order[place]] & Bit.LATER == 0):
             i = cuts.order[place]
             code, place = cuts.codes[i], place + 1
             turned ^= code & Bit.CROSSES
@@ -188,11 +190,13 @@ def emit_touching(
         is_last = decode_place(cuts.codes[first]) == Place.END
         if is_in == Before.ANYWHERE and n_along == 0 and not is_last:
             return UNSURE
-        if not is_open:
+        was_open = is_open
+        if not was_open:
             out.source[row] = source
             _write_end(out, row, 0, segments, item, cuts, first, face)
         is_open = not is_last and (n_along > 0 or (is_in ^ turned) == 1)
         if not is_open:
+            out.source[row] = source if was_open else of_points
             _write_end(out, row, 1, segments, item, cuts, first, face)
             row += 1
     if is_open:
@@ -331,10 +335,42 @@ def cut_group(
             return place, row
         reached = UNSURE
         if n >= 0:
-            reached = emit_touching(segments, item, place, locations[place], boundary.elements, cuts, n, out, row)
+            reached = emit_touching(segments, item, place, place, locations[place], cuts, n, out, row)
         if reached != UNSURE:
             row, state[place] = reached, SETTLED
     return first + segments.shape[0], row
+
+
+@kernel
+def emit_contacts(
+    segments: FloatArray, source: IntArray, contacts: Crossings, is_closed: bool, ends: Int8Array, out: Pieces,
+    state: FlagArray,
+) -> int:  # fmt: skip
+    """Write the pieces of segments (m, 2, 3) on a mesh to `out`; return their number. source: of each contact, sorted,
+    ordered and marked along each; ends (2,): scratch. state (m,): OPEN for those left out, else whether the perturbed
+    line is inside before the first contact, which is not asked of what is not closed; out: 0, or OPEN. A piece of one
+    point has the source -1 - item. Caller guarantees room for each contact and segment."""
+    row, begin = 0, 0
+    for item in range(segments.shape[0]):
+        end = begin
+        while end < source.size and source[end] == item:
+            contacts.codes[end] &= -1 if is_closed else -1 - Bit.CROSSES
+            end += 1
+        n, some, is_in = end - begin, slice(begin, end), is_closed and state[item] != 0
+        begin = end
+        if state[item] == OPEN:
+            continue
+        cuts = Crossings(
+            contacts.t[some], contacts.points[some], contacts.faces[some], contacts.order[:n], contacts.codes[some],
+            contacts.met[some],
+        )  # fmt: skip
+        ends[0], ends[1] = (1 if is_in else -1), (INSIDE_BEFORE if is_in else OUTSIDE_BEFORE)
+        if n > 0 and decode_place(cuts.codes[0]) == Place.START:
+            ends[0] = 0
+        reached = emit_touching(segments, item, item, -1 - item, ends, cuts, n, out, row)
+        state[item] = OPEN if reached == UNSURE else SETTLED
+        row = row if reached == UNSURE else reached
+    return row
 
 
 @allocating_kernel

@@ -21,6 +21,7 @@ A contact in one point has a code (`code_of`), `CROSSES | place + 2 << 1 | ALONG
 | 5 | ALONG | the segment is collinear with the edge, or coplanar with the triangle; it crosses the element nowhere |
 | 6 | BEGINS | the overlap begins there |
 | 7 | CEASES | the overlap ends there |
+| 8 | LATER | of sorted contacts: it is not in the point of the one before |
 
 An overlap longer than a point is two contacts, that of its end after that of its begin.
 
@@ -65,6 +66,7 @@ class Bit(IntEnum):
     ALONG = 32
     BEGINS = 64
     CEASES = 128
+    LATER = 256
 
 
 CROSSED: Final = 2 * Place.WITHIN + 5
