@@ -237,8 +237,8 @@ def to_frame(
     lines: FloatArray, is_ray: bool, aside: FloatArray, frame: FloatArray, placed: FloatArray, blurs: FloatArray
 ) -> None:
     """Set placed (n + 1, 4, 3) to the start and the vector of lines (n, 2, 3) in the frame (3, 7) of a pose, heads and
-    tails of double-doubles, the last to those of a ray along `aside` (3,), and blurs (n + 1,) to a bound on the error of
-    their coordinates, infinite where they are out of range. Tiny ones may underflow: far below the bound."""
+    tails of double-doubles, the last to those of a ray along `aside` (3,), and blurs (n + 1,) to a bound on the error
+    of their coordinates, infinite where they are out of range. Tiny ones may underflow: far below the bound."""
     n = lines.shape[0]
     for i in range(n + 1):
         p, q = lines[max(i - 1, 0), 0], aside

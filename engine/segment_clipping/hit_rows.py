@@ -60,7 +60,7 @@ def order_contacts(mesh: Mesh, line: Line, item: int, cuts: Crossings, n: int, e
     if n > 1:
         _sort(cuts, n)
     for last in range(1, n):
-        i, place, sign = cuts.order[last], last, 1
+        i, place, sign = cuts.order[last], last, 0
         while place > 0:
             sign = _compare(mesh, line, item, cuts, i, cuts.order[place - 1], exact)
             if sign >= 0:
@@ -70,10 +70,10 @@ def order_contacts(mesh: Mesh, line: Line, item: int, cuts: Crossings, n: int, e
         if sign > 1:
             return UNSURE
         cuts.order[place] = i
-    for place in range(1, n):
-        i, before = cuts.order[place], cuts.order[place - 1]
-        if _compare(mesh, line, item, cuts, i, before, exact) != 0:
+        if place > 0 and sign > 0:
             cuts.codes[i] |= Bit.LATER
+        if place < last:
+            cuts.codes[cuts.order[place + 1]] |= Bit.LATER
     return n
 
 
