@@ -104,13 +104,13 @@ def locate_near(
     for item in range(first, last):
         if flag[0]:
             break
-        n_near = bodies_in(points[item], points[item], where, scratch.stack, scratch.near)
+        n_near = bodies_in(points[item], points[item], where, scratch.inner.stack, scratch.near)
         if n_keys + n_near > keys.size:
             break
         p, before = in_space(points, item), n_keys
         for place in range(n_near):
             body = scratch.near[place]
-            location, is_beyond = locate_in_body(tables, body, is_flat, p, scratch.stack, flag)
+            location, is_beyond = locate_in_body(tables, body, is_flat, p, scratch.inner.stack, flag)
             n_beyond += is_beyond
             if tables.kinds[body] == BodyKind.MESH:
                 query_counts[tables.slots[body]] += 1
@@ -141,7 +141,7 @@ def locate_pairs(
         if flag[0]:
             break
         p = in_space(points, owners[pair])
-        located[pair], _ = locate_in_body(tables, bodies[pair], is_flat, p, scratch.stack, flag)
+        located[pair], _ = locate_in_body(tables, bodies[pair], is_flat, p, scratch.inner.stack, flag)
 
 
 @kernel

@@ -11,12 +11,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import STACK, WIDTH, Bvh
+from engine.bounding.bvh import STACK, WIDTH
 from engine.compiling.jit import inline, kernel, merged
-from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
+from engine.lanes.boxes import BOX_ROWS, EMPTY, inside_box
+from engine.lanes.faces import CORNER_ROWS
 from engine.lanes.lanes import array_at, lowest_bit
+from engine.lanes.tracing import LANES
 from engine.segment_clipping.on_boundary.boundary_cut import Crossings
-from engine.segment_clipping.on_boundary.mesh_contacts import Way, far_end, local_segment
+from engine.segment_clipping.on_boundary.descent import Descent, Way, begin_descent, far_end, local_segment, next_leaf
 from engine.segment_clipping.on_boundary.triangle_contacts import corner
 from engine.segment_clipping.pieces import Pieces, point_of
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray, Point3
@@ -28,22 +30,21 @@ _here: Final = threading.local()
 _MOST_CACHED: Final = 1 << 14
 """Most bodies for which a thread caches its work space: some 800 kB."""
 
-Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best hit depths near")
+Scratch = namedtuple("Scratch", "inner cuts room outer best hit n_listed near")
 """Work space of one segment.
 
 | field | meaning |
 |---|---|
-| stack, cuts | for one body: stack of its tree, its `Crossings` |
+| inner, cuts | for one body: descent of its tree, its `Crossings` |
 | room | the pieces in one body; the last row is the first piece of all bodies |
-| waiting, keys | stack of nodes and bodies, and where the segment enters their boxes |
-| entered | (1, 8), where it enters the children of one node |
+| outer | descent of the tree over bodies |
 | best, hit | start of the first piece; its body, and 1 if another may begin there too |
-| depths | number of entries of `waiting`, and of bodies outside the tree still to be tested |
+| n_listed | number of bodies outside the tree still to be tested |
 | near | result: bodies |
 """
 _SIZES: Final = (
     STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
-    2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, 2, MOST_MET,
+    2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, 5, MOST_MET, STACK // 2,
 )  # fmt: skip
 """Sizes of the arrays of a `Scratch` in 8-byte words, in order, without `near`."""
 _AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
@@ -75,12 +76,14 @@ def scratch_at(words: IntArray) -> Scratch:
         array_at(at + _AT[6], (m + 1,), np.int64), array_at(at + _AT[7], (2, m + 1, 3), np.float64),
         array_at(at + _AT[8], (m + 1, 2), np.float64), array_at(at + _AT[9], (m + 1, 2), np.int64),
     )  # fmt: skip
+    stack, keys = array_at(at + _AT[0], (STACK,), np.int32), array_at(at + _AT[17], (STACK,), np.float32)
+    waiting, their_keys = array_at(at + _AT[10], (STACK,), np.int32), array_at(at + _AT[11], (STACK,), np.float32)
+    entered, counts = array_at(at + _AT[12], (1, WIDTH), np.float32), array_at(at + _AT[15], (5,), np.int64)
     return Scratch(
-        array_at(at + _AT[0], (STACK,), np.int32), cuts, room,
-        array_at(at + _AT[10], (STACK,), np.int32), array_at(at + _AT[11], (STACK,), np.float32),
-        array_at(at + _AT[12], (1, WIDTH), np.float32), array_at(at + _AT[13], (1,), np.float64),
-        array_at(at + _AT[14], (2,), np.int64), array_at(at + _AT[15], (2,), np.int64),
-        array_at(at + _AT[17], (words[1],), np.int64),
+        Descent(stack, keys, entered, counts[:1], counts[1:2]), cuts, room,
+        Descent(waiting, their_keys, entered, counts[2:3], counts[3:4]),
+        array_at(at + _AT[13], (1,), np.float64), array_at(at + _AT[14], (2,), np.int64), counts[4:],
+        array_at(at + _AT[18], (words[1],), np.int64),
     )  # fmt: skip
 
 
@@ -88,6 +91,8 @@ BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
 """A tree over bodies. low, high (n, dimension): their boxes, infinite for unbounded ones; tree, inverse: a `Bvh` over
 the bounded ones, if there are enough, and 1 / its scale; bounded: the body of each item; listed: bodies tested one by
 one."""
+_Nodes = namedtuple("_Nodes", "boxes child origin n_inner corners")
+"""The tree of a `BodyTree` as `next_leaf` reads it: all nodes are inner ones."""
 Where = namedtuple("Where", "together moved names")
 """Positions of the bodies of a scene. together: the `BodyTree` of all n as first placed; moved: that of the moved ones,
 numbered from n on; names: the indices of the moved ones in the scene, ascending."""
@@ -124,7 +129,8 @@ def tree_in(row: IntArray, dimension: int) -> BodyTree:
     low, high = array_at(row[LOW], (n, dimension), np.float64), array_at(row[HIGH], (n, dimension), np.float64)
     bounded, listed = array_at(row[BOUNDED], (n,), np.int64), array_at(row[LISTED], (row[N_LISTED],), np.int64)
     origin: Any = numbers[1], numbers[2], numbers[3]
-    return BodyTree(low, high, Bvh(boxes, child, origin, 1.0), numbers[0], bounded, listed)
+    tree = _Nodes(boxes, child, origin, row[N_NODES], array_at(0, (0, CORNER_ROWS, LANES), np.float32))
+    return BodyTree(low, high, tree, numbers[0], bounded, listed)
 
 
 @inline
@@ -156,7 +162,8 @@ def way_of(segments: FloatArray, item: int, bodies: BodyTree) -> Way:
 @inline
 def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
     """Initialise `scratch` for the traversal of a tree along a segment."""
-    scratch.waiting[0], scratch.keys[0], scratch.depths[0], scratch.depths[1] = 0, -1.0, way.is_near, bodies.listed.size
+    begin_descent(scratch.outer)
+    scratch.outer.depth[0], scratch.n_listed[0] = way.is_near, bodies.listed.size
 
 
 @inline
@@ -180,18 +187,12 @@ def next_body(
 ) -> int:
     """Return the next body whose box a segment, or ray, may enter before parameter `last`, roughly in order of entry,
     continuing the traversal of `begin_way`; -1 if there is no more."""
-    depths = scratch.depths
-    while depths[0] > 0:  # bound: each node, and each body, waits once
-        depths[0] -= 1
-        node = scratch.waiting[depths[0]]
-        if scratch.keys[depths[0]] > last:
-            continue
-        if node < 0:
-            return bodies.bounded[-1 - node]
-        depths[0] = _open_node(bodies.tree, node, way, last, scratch, depths[0])
-    while depths[1] > 0:
-        depths[1] -= 1
-        body = bodies.listed[depths[1]]
+    leaf = next_leaf(bodies.tree, way, last, scratch.outer)
+    if leaf != EMPTY:
+        return bodies.bounded[-1 - leaf]
+    while scratch.n_listed[0] > 0:
+        scratch.n_listed[0] -= 1
+        body = bodies.listed[scratch.n_listed[0]]
         if _in_its_box(lines, item, is_ray, bodies, body):
             return body
     return -1
@@ -257,25 +258,6 @@ def near_pairs(
                     pairs[n[1], 0], pairs[n[1], 1] = item, n_before + body
                     n[1] += 1
     n[0] = lines.shape[0]
-
-
-@inline
-def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, depth: int) -> int:
-    """Push the children of a node whose boxes the segment enters before `last` on scratch.waiting, of which depth
-    entries are used, the nearest one on top. Returns the new depth."""
-    waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
-    bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
-    while bits != 0:
-        lane = lowest_bit(bits)
-        bits &= bits - 1
-        waiting[depth], keys[depth] = tree.child[node, lane], scratch.entered[0, lane]
-        nearest, least = depth if keys[depth] < least else nearest, min(keys[depth], least)
-        depth += waiting[depth] != EMPTY
-    if depth > nearest:
-        last = depth - 1
-        waiting[last], waiting[nearest] = waiting[nearest], waiting[last]
-        keys[last], keys[nearest] = keys[nearest], keys[last]
-    return depth
 
 
 @inline

@@ -264,7 +264,7 @@ def list_pairs(
             box[1, i] = where.together.high[name, i] if place < 0 else where.moved.high[place, i]
             if reach != 0.0:
                 box[0, i], box[1, i] = _outward(box[0, i], reach, 0), _outward(box[1, i], reach, 1)
-        for i in range(bodies_in(box[0], box[1], where, scratch.stack, scratch.near)):
+        for i in range(bodies_in(box[0], box[1], where, scratch.inner.stack, scratch.near)):
             near = scratch.near[i]
             other = near if near < n else where.names[near - n]
             if other == name or (other < name and place_in(named, other) >= 0):

@@ -38,7 +38,12 @@ def cut_posed(
     lines, is_closed = lines_on(plain_lines(segments, False), np.arange(n), pose), isinstance(solid, Polyhedron)
     rows, state = search(lines if is_closed else lines._replace(pose=lines.pose[:4]), target, CUT, budget, 1)
     contacts = Crossings(
-        rows.t, rows.barycentric, mesh.faces[rows.triangle], np.arange(len(rows.t)), rows.kind, rows.triangle
+        rows.t,
+        rows.barycentric,
+        mesh.faces[rows.triangle],
+        np.arange(len(rows.t)),
+        rows.t_end.astype(np.int64),
+        rows.triangle,
     )
     state[state != OPEN] &= IS_INSIDE
     out = allocate_pieces(len(rows.t) + n, 3)

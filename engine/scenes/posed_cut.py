@@ -235,7 +235,7 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
     return their number, or UNSURE if one is not proven. With `is_any`, the first triangle proven to be met ends the
     search with 1. blur: error of each coordinate of p and q."""
     cuts = scratch.cuts
-    waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
+    waiting = Waiting(scratch.inner, cuts.order, cuts.faces)
     n_met = append_contacts(mesh, p, q, blur, is_any, False, waiting, cuts.met, cuts.codes, 0)
     for i in range(n_met):
         kind = cuts.codes[i]
@@ -368,7 +368,7 @@ def crossings_in(
         if _is_near_box(numbers, q, blur):
             if lines[TREE] == 0:
                 return WANTS_TREE, False
-            at, _ = locate_in_tree(_tree_of(body[2]), p, 2.0 * blur, scratch.stack, stop)
+            at, _ = locate_in_tree(_tree_of(body[2]), p, 2.0 * blur, scratch.inner.stack, stop)
             if at == UNDECIDED or (at == 0 and not is_any):
                 return UNSURE, False
             is_in = at >= 0

@@ -34,7 +34,7 @@ from engine.scenes.near_boxes import (
 from engine.scenes.posed_cut import UNSURE, WANTS_BODY, between_planes, crossings_in, in_ball
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, Crossings, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
-from engine.segment_clipping.on_boundary.mesh_contacts import Way
+from engine.segment_clipping.on_boundary.descent import Way
 from engine.segment_clipping.pieces import Pieces, put_piece
 from engine.solids.registry import BodyKind
 from engine.types import OPEN, FlagArray, FloatArray, IntArray

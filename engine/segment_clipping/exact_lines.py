@@ -54,9 +54,9 @@ STEP: Final = SLOT + 8
 """Indices of numbers, or of the first of several: 1; R, t, C, w; p, u, p - t, P, E, u x (p - t), M; the corners of a
 triangle, their cross products, ab, bc, ca, their sum, v; the normal; the sides of corners seen along an axis; a
 parameter, another, a value; three for `nearest_quotient`."""
-_N_TERMS: Final = 9
+_N_TERMS, _N_STATES = 9, 7
 AT_START, AT_END, WITHIN = int(Place.START), int(Place.END), int(Place.WITHIN)
-IS_LONG, _IS_PLACED, _LOADED, _SEEN, AXIS, _LINE, TURNED = range(7)
+IS_LONG, _IS_PLACED, _LOADED, _SEEN, AXIS, _LINE, TURNED = range(_N_STATES)
 """What `state` holds: whether a number was too long; whether the pose is stored; the triangle that is, or -1, and the
 axis along which it was seen; the axis along which the line is longest; which line is stored, or -1, and how it is
 turned."""
@@ -68,12 +68,8 @@ Exact = namedtuple("Exact", "heap terms state pose")
 @allocating
 def exact_scratch(pose: FloatArray) -> Exact:
     """Allocate the scratch of lines under a pose (`find_hits`); none needs no room."""
-    exact = Exact(
-        np.empty(_END if pose.shape[0] > 0 else 0, np.int64),
-        np.empty((_N_TERMS, 3), np.int64),
-        np.empty(7, np.int64),
-        pose,
-    )
+    room = _END if pose.shape[0] > 0 else 0
+    exact = Exact(np.empty(room, np.int64), np.empty((_N_TERMS, 3), np.int64), np.empty(_N_STATES, np.int64), pose)
     exact.state[_IS_PLACED], exact.state[_LINE] = 0, -1
     return exact
 

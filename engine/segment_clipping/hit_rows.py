@@ -135,12 +135,12 @@ def write_hits(
 def write_contacts(
     mesh: Mesh, lines: FloatArray, item: int, line: Line, cuts: Crossings, n: int, exact: Exact, out: Rows, row: int
 ) -> int:
-    """Write n contacts, ordered, of a segment under a pose to `out` from `row` on, codes as kinds, points as
-    barycentrics; return the next row, or UNSURE."""
+    """Write n contacts, ordered, of a segment under a pose to `out` from `row` on: in t_end their
+    codes, in barycentric their points; return the next row, or UNSURE."""
     for place in range(n):
         i = cuts.order[place]
         t, low, code, point = cuts.t[i], cuts.points[i, 3], cuts.codes[i], out.barycentric[row]
-        out.source[row], out.t[row], out.triangle[row], out.kind[row] = item, t, cuts.met[i], code
+        out.source[row], out.t[row], out.triangle[row], out.t_end[row] = item, t, cuts.met[i], code
         if Place.START <= decode_place(code) <= Place.END:
             for k in range(3):
                 point[k] = lines[item, decode_place(code) - Place.START, k] + 0.0

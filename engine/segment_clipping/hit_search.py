@@ -1,7 +1,7 @@
-"""Search for the hits of segments and rays on a mesh, compiled: an ordered descent of its tree of boxes.
+"""Search for the hits of segments and rays on a mesh, compiled: an ordered descent of its tree of boxes (descent.py).
 
-Boxes are entered about in order, and none that begins behind the first hit so far, if that is all that is wanted
-(`_bound_of`). What a kernel does not decide stays OPEN (exact_hits.py).
+No box is entered that begins behind the first hit so far, if that is all that is wanted (`_bound_of`). What a kernel
+does not decide stays OPEN (exact_hits.py).
 
 Source: I. Wald, C. Benthin, S. Boulos, Getting rid of packets: efficient SIMD single-ray traversal using
 multi-branching BVHs, 2008.
@@ -14,12 +14,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import STACK, WIDTH
 from engine.compiling.jit import allocating_kernel, called, inline, merged
-from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
-from engine.lanes.faces import CORNER_ROWS, longest_axis, near_triangles
-from engine.lanes.lanes import lowest_bit, prefetch
-from engine.lanes.tracing import LANES
+from engine.lanes.boxes import EMPTY
+from engine.lanes.faces import longest_axis, near_triangles
+from engine.lanes.lanes import lowest_bit
 from engine.predicates.error_free import two_diff
 from engine.segment_clipping.exact_contacts import exact_codes, put_exact_contact
 from engine.segment_clipping.exact_lines import Exact, exact_scratch
@@ -29,7 +27,15 @@ from engine.segment_clipping.hit_rows import Rows, order_contacts, write_contact
 from engine.segment_clipping.on_boundary.boundary_cut import UNSURE, Crossings, allocate_crossings
 from engine.segment_clipping.on_boundary.contacts import CODE_BITS, Bit, Kind, Place, decode_place
 from engine.segment_clipping.on_boundary.crossing_values import Vector, is_item_safe
-from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, far_end, local_segment, shear_of
+from engine.segment_clipping.on_boundary.descent import (
+    LIMIT,
+    allocate_descent,
+    begin_descent,
+    far_end,
+    local_segment,
+    next_leaf,
+    shear_of,
+)
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh
 from engine.segment_clipping.on_boundary.triangle_contacts import corner, triangle_at
 from engine.types import OPEN, FlagArray, FloatArray, IntArray, Point3
@@ -40,7 +46,7 @@ with the points where they are; CODES: the codes of all contacts."""
 IS_INSIDE: Final = 4
 """Bit of the state of a segment that is cut: the perturbed line is inside a closed mesh before its first contact."""
 SETTLED, MET, NO_ROOM, GOES_ON = 0, 1, -2, -3
-_Scratch = namedtuple("_Scratch", "stack keys entered cuts exact")
+_Scratch = namedtuple("_Scratch", "descent cuts exact")
 _DEGENERATE: Final = int(Kind.DEGENERATE)
 _OPEN_ROWS: Final = 4
 
@@ -84,31 +90,6 @@ def _aside(line: Line, pose: FloatArray) -> Line:
 
 
 @merged
-def _push(mesh: Mesh, node: int, bits: int, scratch: _Scratch, depth: int) -> int:
-    """Push the children of an inner node that are set in `bits`, the first entered on top; return the new depth."""
-    stack, keys, bottom = scratch.stack, scratch.keys, depth
-    while bits != 0:
-        lane = lowest_bit(bits)
-        bits &= bits - 1
-        below, at = mesh.child[node, lane], depth
-        if below < 0:  # case: numbers that are none, which nothing separates
-            continue
-        while at > bottom and keys[at - 1] < scratch.entered[0, lane]:
-            stack[at], keys[at] = stack[at - 1], keys[at - 1]
-            at -= 1
-        stack[at], keys[at] = below, scratch.entered[0, lane]
-        depth += 1
-        prefetch(mesh.child, below * WIDTH)
-        if below < mesh.n_inner:
-            for row in range(0, BOX_ROWS * WIDTH, 16):
-                prefetch(mesh.boxes, below * (BOX_ROWS * WIDTH) + row)
-        else:
-            for row in range(0, CORNER_ROWS * LANES, 16):
-                prefetch(mesh.corners, (below - mesh.n_inner) * (CORNER_ROWS * LANES) + row)
-    return depth
-
-
-@inline
 def _search(mesh: Mesh, line: Line, item: int, keep: int, scratch: _Scratch, stop: FlagArray) -> int:
     """Fill the cuts of `scratch` with the contacts of line number ``item``, or those of its first hit; return their
     number, NO_ROOM, or UNSURE. ANY: 1 if there is one. NEAR: cuts.met is filled with all triangles near. CODES:
@@ -126,19 +107,15 @@ def _search(mesh: Mesh, line: Line, item: int, keep: int, scratch: _Scratch, sto
         return UNSURE
     far = far_end(start, way, line.is_ray)
     local = local_segment(start, far, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), line.blur * max(x, y, z))
+    if not local.is_near:
+        return 0
     (i, j, k), place, r, s, across, slack = shear_of(local)
-    stack, keys, entered, cuts, last = scratch.stack, scratch.keys, scratch.entered, scratch.cuts, np.float32(1.0)
-    n, best, is_open, depth = 0, np.inf, False, int(local.is_near)
-    stack[0], keys[0] = 0, np.float32(-1.0)
-    while depth > 0:  # bound: each node enters the stack once
-        depth -= 1
-        node = stack[depth]
-        if keys[depth] > last or stop[0]:
-            continue
-        if node < mesh.n_inner:
-            bits = enter_boxes(mesh.boxes, node, local.middle, local.inverse, local.slack, last, entered)
-            depth = _push(mesh, node, bits, scratch, depth)
-            continue
+    cuts, last, n, best, is_open = scratch.cuts, np.float32(1.0), 0, np.inf, False
+    begin_descent(scratch.descent)
+    while not stop[0]:  # bound: each turn takes a leaf
+        node = next_leaf(mesh, local, last, scratch.descent)
+        if node == EMPTY:
+            break
         bits = near_triangles(mesh.corners, node - mesh.n_inner, i, j, k, place, r, s, across, slack)
         while bits != 0:
             below = mesh.child[node, lowest_bit(bits)]
@@ -246,49 +223,61 @@ def _n_before(cuts: Crossings, n: int) -> int:
 
 
 @called
+def _search_again(mesh: Mesh, line: Line, item: int, keep: int, scratch: _Scratch, stop: FlagArray) -> int:
+    """Return what `_search` does: a second search of a line is rare."""
+    return _search(mesh, line, item, keep, scratch, stop)
+
+
+@called
+def _location_before(mesh: Mesh, line: Line, item: int, n: int, scratch: _Scratch, stop: FlagArray) -> int:
+    """Return whether the perturbed line is inside a closed mesh before the first of n ordered contacts of a segment
+    under a pose, as a bit of its state: 0 if that is not asked, else also NO_ROOM or UNSURE."""
+    cuts = scratch.cuts
+    if n == 0 or decode_place(cuts.codes[cuts.order[0]]) != Place.START:
+        n = _search_again(mesh, _aside(line, scratch.exact.pose), item, CODES, scratch, stop)
+    elif _leaves(cuts, n):
+        n = _search_again(mesh, _back(line), item, CODES, scratch, stop)
+    else:
+        return 0
+    return n if n < 0 else IS_INSIDE * (_n_before(cuts, n) & 1)
+
+
+@called
 def _run(
     lines: FloatArray, placed: FloatArray, blurs: FloatArray, is_ray: bool, mesh: Mesh, rims: FlagArray, keep: int,
     scratch: _Scratch, stop: FlagArray, out: Rows, state: FlagArray, n: IntArray,
 ) -> None:  # fmt: skip
     """Search for each line, see `find_hits`."""
-    row, n[1], n[2], cuts, pose = 0, 0, 0, scratch.cuts, scratch.exact.pose
+    row, n[1], n[2], cuts, exact = 0, 0, 0, scratch.cuts, scratch.exact
     for item in range(n[0], lines.shape[0]):
         n[0], state[item] = item, OPEN
         if stop[0]:
             return
         if not (blurs[item] < np.inf if placed.shape[0] > 0 else is_item_safe(lines, item)):
             continue
-        line, want, reached, n_met, outcome = _line_of(lines, placed, blurs, item, is_ray), keep, row, 0, 0
-        while want >= 0:  # bound: two searches
-            n_met = _search(mesh, line, item, want, scratch, stop)
-            now, want = want, -1
-            if n_met == NO_ROOM or (now != ANY and now != CODES and row + n_met > out.source.size):
-                n[2] = 1
-                return
-            if n_met == GOES_ON:
-                want = ALL
-            elif now == CODES:
-                outcome += IS_INSIDE * (_n_before(cuts, n_met) & 1)
-            elif n_met >= 0:
-                outcome = MET if n_met > 0 else SETTLED
-            if n_met > 0 and now == NEAR:
-                for i in range(n_met):
-                    out.source[row + i], out.triangle[row + i] = item, cuts.met[i]
-                reached = row + n_met
-            elif n_met > 0 and now != ANY and now != CODES:
-                n_met = order_contacts(mesh, line, item, cuts, n_met, scratch.exact)
-                if n_met > 0 and now == CUT:
-                    reached = write_contacts(mesh, lines, item, line, cuts, n_met, scratch.exact, out, row)
-                    n_met = min(n_met, reached)
-                elif n_met > 0:
-                    reached = write_hits(mesh, rims, cuts, n_met, now != ALL, item, out, row)
-            if n_met >= 0 and now == CUT and pose.shape[0] > _OPEN_ROWS:
-                if n_met == 0 or decode_place(cuts.codes[cuts.order[0]]) != Place.START:
-                    line, want = _aside(line, pose), CODES
-                elif _leaves(cuts, n_met):
-                    line, want = _back(line), CODES
-        if n_met != UNSURE:
-            row, state[item] = reached, outcome
+        line = _line_of(lines, placed, blurs, item, is_ray)
+        n_met, reached, bit = _search(mesh, line, item, keep, scratch, stop), row, 0
+        if n_met == GOES_ON:
+            n_met = _search_again(mesh, line, item, ALL, scratch, stop)
+        has_room = n_met != NO_ROOM and (keep == ANY or row + n_met <= out.source.size)
+        if n_met > 0 and has_room and keep == NEAR:
+            for i in range(n_met):
+                out.source[row + i], out.triangle[row + i] = item, cuts.met[i]
+            reached = row + n_met
+        elif n_met > 0 and has_room and keep != ANY:
+            n_met = order_contacts(mesh, line, item, cuts, n_met, exact)
+            if n_met > 0 and keep == CUT:
+                reached = write_contacts(mesh, lines, item, line, cuts, n_met, exact, out, row)
+                n_met = min(n_met, reached)
+            elif n_met > 0:
+                reached = write_hits(mesh, rims, cuts, n_met, keep != ALL, item, out, row)
+        if n_met >= 0 and has_room and keep == CUT and exact.pose.shape[0] > _OPEN_ROWS:
+            bit = _location_before(mesh, line, item, n_met, scratch, stop)
+        if not has_room or bit == NO_ROOM:
+            n[2] = 1
+            return
+        if n_met >= 0 and bit >= 0:
+            row, state[item] = reached, bit + (MET if n_met > 0 else SETTLED)
         n[1] = row
     n[0] = lines.shape[0]
 
@@ -310,6 +299,5 @@ def find_hits(
     | state (m,) uint8 | out: SETTLED (no hit), MET, or OPEN; CUT: the first two with IS_INSIDE maybe |
     | n (3,) int64 | 0: the first line, on return the next; 1: rows filled; 2: whether room or rows are too few |
     """
-    stack, keys, entered = np.empty(STACK, np.int32), np.empty(STACK, np.float32), np.empty((1, WIDTH), np.float32)
-    scratch = _Scratch(stack, keys, entered, allocate_crossings(room, 4), exact_scratch(pose))
+    scratch = _Scratch(allocate_descent(), allocate_crossings(room, 4), exact_scratch(pose))
     _run(lines, placed, blurs, is_ray, mesh, rims, keep, scratch, stop, out, state, n)

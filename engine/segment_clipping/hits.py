@@ -252,7 +252,7 @@ def search(
                 np.empty(m),
                 np.empty(m),
                 np.empty(m, np.int64),
-                np.empty(m, np.int64),
+                np.empty(m, np.int8),
                 np.empty((m, 3)),
             )
             entry_of(find_hits)(
@@ -275,7 +275,7 @@ def search(
     every = [part for first in sorted(parts) for part in parts[first]]
     if not every:
         none, whole = np.zeros(0), np.zeros(0, np.int64)
-        return Rows(whole, none, none, whole, whole, np.zeros((0, 3))), state
+        return Rows(whole, none, none, whole, np.zeros(0, np.int8), np.zeros((0, 3))), state
     return Rows(*join_columns(every, budget, workers)), state
 
 
@@ -306,7 +306,7 @@ def columns_of(rows: list[tuple[int, ExactHit]]) -> list[Any]:
         np.array([nearest_float(each.t) for _, each in rows], np.float64),
         np.array([nearest_float(each.t_end) for _, each in rows], np.float64),
         np.array([each.triangle for _, each in rows], np.int64),
-        np.array([each.kind for _, each in rows], np.int64),
+        np.array([each.kind for _, each in rows], np.int8),
         np.array([[nearest_float(x) for x in each.weights] for _, each in rows], np.float64).reshape(-1, 3),
     ]
 
@@ -337,4 +337,4 @@ def with_faces(
     for each in {*triangle[are_open].tolist()} if are_open.any() else ():
         budget.check()
         normal[triangle == each] = exact_normal(image(target.mesh.elements[each].tolist()))
-    return Hits(source, t, t_end, target.mesh.faces[triangle], triangle, kind.astype(np.int8), barycentric, normal)
+    return Hits(source, t, t_end, target.mesh.faces[triangle], triangle, kind, barycentric, normal)

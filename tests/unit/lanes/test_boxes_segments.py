@@ -9,7 +9,7 @@ import numpy as np
 from engine.bounding.bvh import build_bvh
 from engine.compiling.jit import kernel
 from engine.lanes.boxes import enter_boxes
-from engine.segment_clipping.on_boundary.mesh_contacts import local_segment
+from engine.segment_clipping.on_boundary.descent import local_segment
 from engine.types import Point3
 
 Floats = np.ndarray

@@ -12,7 +12,7 @@ from engine import Polyhedron
 from engine.compiling.jit import kernel
 from engine.containment.prepared import tree_of
 from engine.lanes.faces import near_triangles, overhead
-from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
+from engine.segment_clipping.on_boundary.descent import local_segment, shear_of
 from engine.segment_clipping.on_boundary.prepared_boundary import mesh_of
 from engine.types import Point3
 

@@ -9,7 +9,8 @@ import numpy as np
 from engine.predicates.rational import common_integers, cross, minus
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_overlap
 from engine.segment_clipping.on_boundary.contacts import Kind, Place
-from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, find_contacts_3d, local_segment
+from engine.segment_clipping.on_boundary.descent import LIMIT, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import find_contacts_3d
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
 from engine.segment_clipping.on_boundary.triangle_contacts import exact_contact
 from engine.types import Point3
