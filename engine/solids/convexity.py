@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.compiling.jit import allocating_kernel, entry_of, inline, kernel
+from engine.compiling.jit import allocating, allocating_kernel, entry_of, inline
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
 from engine.solids.mesh import Polyhedron
@@ -45,31 +45,36 @@ def convexity(solid: Polyhedron) -> Convexity | None:
 
 
 def _certified(solid: Polyhedron) -> Convexity | None:
-    vertices, triangles = read_only(solid.vertices), read_only(solid.triangles)
-    with np.errstate(all="ignore"):  # an overflow is not certified; kernels, where they run uncompiled
-        center, side = _center_and_side(vertices, triangles)
-        if side == 0:
-            return None
-        is_convex = entry_of(_is_convex)(vertices, triangles, center, side)
-    return Convexity(center, side < 0) if is_convex else None
+    center, side = _center_and_side(solid, True)
+    return Convexity(center, side < 0) if side != 0 else None
 
 
-def _center_and_side(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, int]:
-    """Return the mean corner of all triangles, and their common side of it, 0 if there is none."""
+def _center_and_side(solid: Polyhedron, is_convex: bool) -> tuple[FloatArray, int]:
+    """Return the mean corner of all triangles, and what `_certified_side` says."""
     center = np.empty(3)
-    return center, entry_of(_common_side)(vertices, triangles, center)
+    with np.errstate(all="ignore"):  # an overflow is not certified; kernels, where they run uncompiled
+        return center, entry_of(_certified_side)(
+            read_only(solid.vertices), read_only(solid.triangles), is_convex, center
+        )
 
 
 def star_side(solid: Polyhedron) -> int:
     """Return -1 if the mesh of a polyhedron is the graph of a distance over a sphere about its centre, see the head of
     this file, with its faces counter-clockwise seen from outside, 1 with clockwise ones; 0 if that is not certain."""
-    vertices, triangles = read_only(solid.vertices), read_only(solid.triangles)
-    with np.errstate(all="ignore"):
-        center, side = _center_and_side(vertices, triangles)
-        return side if side != 0 and _is_graph(vertices, triangles, center, side) else 0
+    return _center_and_side(solid, False)[1]
 
 
-@kernel
+@allocating_kernel
+def _certified_side(vertices: FloatArray, triangles: IntArray, is_convex: bool, center: FloatArray) -> int:
+    """Fill center (3,) with the mean corner of all triangles. Return the common side of all triangles on which it lies,
+    if some half-line from it crosses one triangle, and, if is_convex, the mesh is convex at each edge; else 0."""
+    side = _common_side(vertices, triangles, center)
+    if side == 0 or (is_convex and not _is_convex(vertices, triangles, side)):
+        return 0
+    return side if _is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side) else 0
+
+
+@inline
 def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
     """Fill center (3,) with the mean corner of all triangles; return 1 or -1 if orient3d(a, b, c, center) has that sign
     for all of them, else 0."""
@@ -92,11 +97,11 @@ def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) 
     return side
 
 
-@allocating_kernel
-def _is_convex(vertices: FloatArray, triangles: IntArray, center: FloatArray, side: int) -> bool:
-    """Return whether the mesh is locally convex at every edge, each of which is used once in either direction, and some
-    half-line from the centre crosses one triangle. side: result of `_common_side`. The edge that starts at corner k of
-    triangle i has number 3 i + k; a hash table lists them."""
+@allocating
+def _is_convex(vertices: FloatArray, triangles: IntArray, side: int) -> bool:
+    """Return whether the mesh is locally convex at every edge, each of which is used once in either direction. side:
+    result of `_common_side`. The edge that starts at corner k of triangle i has number 3 i + k; a hash table lists
+    them."""
     n_slots = 8
     while n_slots < 6 * triangles.shape[0]:
         n_slots *= 2
@@ -115,7 +120,7 @@ def _is_convex(vertices: FloatArray, triangles: IntArray, center: FloatArray, si
         sign = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > edge else 0
         if sign != 0 and sign != side:
             return False
-    return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
+    return True
 
 
 @inline
@@ -130,12 +135,6 @@ def _slot_of_edge(slots: IntArray, triangles: IntArray, start: int, end: int) ->
             break
         place = (place + 1) & last
     return place
-
-
-@kernel
-def _is_graph(vertices: FloatArray, triangles: IntArray, center: FloatArray, side: int) -> bool:
-    """Return whether some half-line from the centre crosses one triangle. side: result of `_common_side`."""
-    return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
 
 
 @inline
