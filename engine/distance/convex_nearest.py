@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import namedtuple
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -118,22 +118,24 @@ def _mesh_of(solid: Solid) -> Hull | None:
 def nearest_of_hulls(first: Solid, second: Solid, poses: Poses) -> Clearance | None:
     """Return the clearance of two bodies of space under poses; None if they are not proven to be convex, apart and
     with one nearest pair of points, or apart along axes."""
-    return _answer(nearest_of_convex, hull_of(first), hull_of(second), poses)
+    return _answer(hull_of(first), hull_of(second), poses, True)
 
 
 def nearest_of_meshes(first: Solid, second: Solid, poses: Poses) -> Clearance | None:
     """Return the clearance of two bodies of space under poses, convex or not; None if they are not proven to be apart
     along axes."""
-    return _answer(nearest_along_axes, _mesh_of(first), _mesh_of(second), poses)
+    return _answer(_mesh_of(first), _mesh_of(second), poses, False)
 
 
-def _answer(nearest: Any, a: Hull | None, b: Hull | None, poses: Poses) -> Clearance | None:
-    """Return what a kernel says of two bodies, if it proves anything."""
+def _answer(a: Hull | None, b: Hull | None, poses: Poses, are_convex: bool) -> Clearance | None:
+    """Return what the kernel says of two bodies, if it proves anything."""
     if a is None or b is None:
         return None
     own, their = (STILL if at is None else PoseArrays(at.rotation[None], at.translation[None], True) for at in poses)
     points, row = np.empty((2, 3)), np.empty(4, np.int64)
-    distance = entry_of(nearest)(a.pool, a.named.faces, own, b.pool, b.named.faces, their, points, row)
+    distance = entry_of(nearest_of_convex)(
+        a.pool, a.named.faces, own, b.pool, b.named.faces, their, are_convex, points, row
+    )
     if not distance > 0.0:
         return None
     points.setflags(write=False)
@@ -227,23 +229,15 @@ def _measure_on_faces(
 @kernel
 def nearest_of_convex(
     first: ConvexArrays, faces: IntArray, first_pose: PoseArrays, second: ConvexArrays, second_faces: IntArray,
-    second_pose: PoseArrays, points: FloatArray, row: IntArray,
+    second_pose: PoseArrays, are_convex: bool, points: FloatArray, row: IntArray,
 ) -> float:  # fmt: skip
-    """Return the distance of two convex bodies, the nearest double, and fill points (2, 3) with the nearest points and
-    row (4,) with a triangle and the code of the feature in it of each body; NaN where any of it is unproven. Of several
-    triangles the first is named. faces, second_faces: of the triangles."""
-    distance = _only_nearest(first, first_pose, second, second_pose, points, row)
+    """Return the distance of two bodies, the nearest double, and fill points (2, 3) with the nearest points and row
+    (4,) with a triangle and the code of the feature in it of each body; NaN where any of it is unproven. Of several
+    triangles the first is named. faces, second_faces: of the triangles. Of bodies that need not be convex only vertices
+    and triangles are read."""
+    distance = _only_nearest(first, first_pose, second, second_pose, points, row) if are_convex else np.nan
     if distance > 0.0:
         return distance
-    return nearest_across(first, faces, first_pose, second, second_faces, second_pose, points, row)
-
-
-@kernel
-def nearest_along_axes(
-    first: ConvexArrays, faces: IntArray, first_pose: PoseArrays, second: ConvexArrays, second_faces: IntArray,
-    second_pose: PoseArrays, points: FloatArray, row: IntArray,
-) -> float:  # fmt: skip
-    """As `nearest_of_convex`, of bodies that need not be convex; only their vertices and triangles are read."""
     return nearest_across(first, faces, first_pose, second, second_faces, second_pose, points, row)
 
 
