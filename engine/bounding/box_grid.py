@@ -180,15 +180,15 @@ def _sweep_grid(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) 
 def _build_grid(low: FloatArray, high: FloatArray, budget: Budget, workers: int | None) -> CornerGrid | None:
     """Return the `CornerGrid` of boxes (n, d), or None where a sweep is faster or coordinates are not finite."""
     n_boxes, dimension = low.shape
-    extent = np.empty(n_boxes)
-    _measure_extents(low, high, extent)
+    extent = np.zeros(n_boxes)
+    for axis in range(dimension):
+        side = high[:, axis] - low[:, axis]
+        np.maximum(extent, np.where(np.isfinite(side), side, np.inf), out=extent)
     widest, widest_of_all = float(np.partition(extent, n_boxes - _LARGE - 1)[n_boxes - _LARGE - 1]), float(extent.max())
     if widest * 4.0 >= widest_of_all:  # all of like size: none is large
         widest = widest_of_all
-    span = np.array([[np.inf] * 3, [-np.inf] * 3])
-    _corner_ranges(low, extent, widest, span)
-    least, most = span
-    least[dimension:] = most[dimension:] = 0.0
+    least, most, small = np.zeros(3), np.zeros(3), low if widest == widest_of_all else low[extent <= widest]
+    least[:dimension], most[:dimension] = small.min(axis=0), small.max(axis=0)
     width = np.maximum(widest, (most - least) / (n_boxes ** (1.0 / dimension) * 2.0))
     width = width * _ENLARGED + 2.0**-52 * np.maximum(np.abs(least), np.abs(most)) * 4.0 + 2.0**-1000
     last = np.floor((most - least) / width)
@@ -207,29 +207,6 @@ def _build_grid(low: FloatArray, high: FloatArray, budget: Budget, workers: int 
 
     run_chunks(fill, n_boxes, budget=budget, workers=workers)
     return grid
-
-
-@kernel
-def _measure_extents(low: FloatArray, high: FloatArray, extent: FloatArray) -> None:
-    """Fill extent (n,) with the largest side of each box, infinite where a bound is infinite or the side overflows."""
-    for box in range(low.shape[0]):
-        side = 0.0
-        for axis in range(low.shape[1]):
-            side = max(side, high[box, axis] - low[box, axis])
-            if not (np.isfinite(low[box, axis]) and np.isfinite(high[box, axis])):
-                side = np.inf
-        extent[box] = side
-
-
-@kernel
-def _corner_ranges(low: FloatArray, extent: FloatArray, widest: float, span: FloatArray) -> None:
-    """Fill span (2, 3) with the least and the largest low corner, by axis, among boxes whose extent (n,) is <=
-    `widest`."""
-    for box in range(low.shape[0]):
-        if extent[box] <= widest:
-            for axis in range(low.shape[1]):
-                span[0, axis] = min(span[0, axis], low[box, axis])
-                span[1, axis] = max(span[1, axis], low[box, axis])
 
 
 @allocating_kernel
