@@ -11,8 +11,7 @@ import numpy as np
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.files.meshes import read_mesh
-from engine.inspection.mends import filled, oriented, welded
-from engine.inspection.nesting import nesting
+from engine.inspection.mends import filled, nesting, oriented, welded
 from engine.running.budget import Budget, Cancel
 from engine.solid_cutting.faults import are_flat, crossings, edges_of, junctions, shells_of
 from engine.solids.accepted import SolidLike

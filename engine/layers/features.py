@@ -22,10 +22,9 @@ from engine.layers.json_text import text_of
 from engine.layers.limits import Limits
 from engine.layers.members import crs_of, groups_of, members_of, texts_of
 from engine.layers.path_rows import clip_mixed, overlay_mixed
+from engine.layers.pieces import slivers_of, split_rows
 from engine.layers.rows import NONE, LayerRows
 from engine.layers.shapes import MixedLayer
-from engine.layers.splits import split_rows
-from engine.layers.widths import slivers_of
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
 from engine.solids.checks import shown

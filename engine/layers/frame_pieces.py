@@ -9,9 +9,8 @@ import numpy as np
 from engine.layers.frame_reading import check_frames, geopandas_and_shapely, mixed_of
 from engine.layers.frames import frame_of_left
 from engine.layers.limits import Limits
+from engine.layers.pieces import narrow_rings, split_rows
 from engine.layers.shapes import AREA, LINE
-from engine.layers.splits import split_rows
-from engine.layers.widths import narrow_rings
 from engine.running.budget import Cancel
 from engine.solids.ragged import summed
 

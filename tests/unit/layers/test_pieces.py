@@ -11,7 +11,7 @@ import pytest
 
 import engine
 from engine.errors import InvalidInputError, UnsupportedSolidError
-from engine.layers.widths import width_square
+from engine.layers.pieces import width_square
 
 geopandas = pytest.importorskip("geopandas")
 shapely = pytest.importorskip("shapely")

@@ -1,15 +1,18 @@
-"""Slivers: pieces that are narrower than a distance, decided exactly.
+"""Pieces of layers: polygons split by lines, a row for each piece; and slivers, pieces that are narrower than a
+distance, decided exactly.
 
 The width of a piece is the least distance of two parallel lines between which it lies. One of them then runs along an
 edge of its convex hull, so the square of the width is the least, over these edges, of the largest square of a distance
 of a vertex from the edge's line: a fraction. A polygon lies in a strip of its width w and in its box of diagonal d, so
 its area is at most w d: most pieces are decided by that, in doubles with a bound on the rounding.
 
-Source: M. E. Houle, G. T. Toussaint, Computing the width of a set, 1988.
+Sources: D. E. Muller, F. P. Preparata, Finding the intersection of two convex polyhedra, 1978 (faces, as split.py);
+M. E. Houle, G. T. Toussaint, Computing the width of a set, 1988.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Final
@@ -19,14 +22,44 @@ import numpy as np
 from engine.distance.clearance import checked_distance
 from engine.layers.limits import Limits
 from engine.layers.nearest import root_of
-from engine.layers.rows import LayerRows
+from engine.layers.rows import NONE, LayerRows, concatenate_rows, rows_of, rows_of_pairs
+from engine.layers.shapes import MixedLayer
+from engine.polygon_overlay.pair_arrays import PolygonSelection
+from engine.polygon_overlay.split import rings_of, split_rings
 from engine.predicates.rational import common_integers
 from engine.running.budget import polled
-from engine.solids.ragged import next_in_rings
+from engine.solids.ragged import next_in_rings, summed
 from engine.types import FloatArray, IntArray
 
 _LEAST: Final = 2.0**-900
 """Area from which no product of doubles above was near underflow."""
+
+
+def split_rows(layer: MixedLayer, lines: MixedLayer, limits: Limits) -> LayerRows:
+    """Return the pieces of polygons between lines, a row each, by feature; pieces of one are in lexicographic order."""
+    arrays, paths = layer.areas.arrays, lines.paths
+    path, _ = paths.owners()
+    tails = np.flatnonzero(path[:-1] == path[1:])
+    segments = np.stack([paths.vertices[tails], paths.vertices[tails + 1]], axis=1)
+    filled = np.flatnonzero(arrays.sizes())
+    low, high = arrays.boxes(filled)
+    n, ends = len(filled), (np.concatenate([low, segments.min(axis=1)]), np.concatenate([high, segments.max(axis=1)]))
+    pairs = limits.pairs_of_boxes(*ends, None, n)
+    offsets = np.searchsorted(pairs[:, 0], np.arange(n + 1))
+    is_met = np.diff(offsets) > 0
+    whole = PolygonSelection(arrays, filled[~is_met])
+    parts = [rows_of_pairs(whole, whole, "intersection", filled[~is_met], np.full(len(whole), NONE), limits)]
+    with limits.budget() as budget:
+        for k in np.flatnonzero(is_met).tolist():
+            budget.check()
+            near = segments[pairs[offsets[k] : offsets[k + 1], 1] - n]
+            made = split_rings(rings_of(arrays.polygon(int(filled[k]))), near, budget)
+            parts.append(rows_of(made, np.full(len(made), filled[k])))
+    rows = concatenate_rows(parts)
+    of_pieces = np.repeat(np.arange(len(rows)), np.diff(rows.row_offsets))
+    left = rows.left[of_pieces]
+    rows = replace(rows, left=left, right=np.full(len(left), NONE), row_offsets=summed(np.ones(len(left), np.int64)))
+    return rows.take(np.argsort(left, kind="stable"))
 
 
 def narrow_rings(
