@@ -10,9 +10,8 @@ from typing import Any, Final, Literal, Protocol, cast, overload
 
 import numpy as np
 
-from engine.layers.altitudes import heights_at
 from engine.layers.json_text import text_of
-from engine.layers.rows import LayerRows
+from engine.layers.rows import LayerRows, heights_at
 from engine.solids.ragged import summed
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 

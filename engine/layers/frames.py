@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.errors import InvalidInputError
-from engine.layers.altitudes import heights_at
 from engine.layers.dissolve import check_gaps, dissolve_mixed
 from engine.layers.frame_reading import check_frames, dims_of, geopandas_and_shapely, mixed_of
 from engine.layers.limits import Limits
 from engine.layers.path_rows import clip_mixed, overlay_mixed
-from engine.layers.rows import NONE, LayerRows, check_how
+from engine.layers.rows import NONE, LayerRows, check_how, heights_at
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options

@@ -3,6 +3,8 @@
 A layer is a list of polygons, None where a feature has no geometry. Features are paired by their boxes; all pairs are
 overlaid in one batch. Rows are in the order of geopandas.overlay: pairs by left, then right; then the remainders of the
 left layer, then of the right.
+
+Decisions are those of the plane: of altitudes, vertices that stay keep theirs, and none is interpolated.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from engine.polygon_overlay.pair_arrays import (
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import NOWHERE, Touching, collapsed, concatenate_touching, touching
-from engine.running.budget import polled
+from engine.running.budget import note, polled
 from engine.scenes.point_queries import locate_scene
 from engine.solids.accepted import PointsLike
 from engine.solids.checks import shown
@@ -363,3 +365,24 @@ def without_areas(left: IntArray, right: IntArray, touching: Touching) -> LayerR
     """Return rows that have lines and points alone. left, right (m,): the features of each row; touching: its parts."""
     nothing = np.zeros(1, np.int64)
     return LayerRows(left, right, np.zeros((0, 2)), nothing, nothing, np.zeros(len(left) + 1, np.int64), 0, touching)
+
+
+def heights_at(places: FloatArray, rows: IntArray, sources: list[tuple[FloatArray, IntArray]]) -> FloatArray | None:
+    """Return the altitude of each of n vertices of an answer, NaN for new ones; None if the input has no altitudes.
+
+    places (n, 2), rows (n,): vertices, and the row of each. sources: for each input layer its vertices with altitude
+    (m, 4), feature, x, y, altitude, and (n_rows,) the feature that each row comes from (or its group, if the first
+    column has groups). Of two altitudes at a vertex the first counts."""
+    heights = np.full(len(places), np.nan)
+    sides = [(known[~np.isnan(known[:, 3]) & (known[:, 0] != NONE)], of_rows) for known, of_rows in sources]
+    if not len(places) or not any(len(known) for known, _ in sides):
+        return None
+    for known, of_rows in sides:
+        wanted = np.column_stack([of_rows[rows], places + 0.0])
+        _, names = np.unique(np.concatenate([known[:, :3] + 0.0, wanted]), axis=0, return_inverse=True)
+        names, values = names.reshape(-1), np.full(len(known) + len(wanted), np.nan)
+        values[names[: len(known)][::-1]] = known[::-1, 3]
+        heights = np.where(np.isnan(heights), values[names[len(known) :]], heights)
+    n_new = int(np.isnan(heights).sum())
+    note(f"altitudes: {len(places) - n_new} vertices keep theirs, {n_new} new ones have none")
+    return heights
