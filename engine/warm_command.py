@@ -1,4 +1,8 @@
-"""``python -m engine warm``, and the progress bar of all commands."""
+"""``python -m engine warm``, and the progress bar of all commands.
+
+Kernels for other machines are compiled in groups, each by one process with a cache of its own: the same bytes whatever
+the machine.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +13,27 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
 
 from engine.compiling.cold_start import PLAIN_ERRORS
 from engine.compiling.kernel_cache import cache_folder, check_owner, seal, seed
 from engine.running.parallel import Progress
-from engine.warm_groups import GROUPS, call_group
-from engine.warmup import warm
+from engine.solids.checks import as_points
+from engine.solids.csg import Csg
+from engine.solids.implicit import Implicit
+from engine.solids.primitives import Triangle
+from engine.warmup import RELATED, STEPS, regions_of, warm
 
 Options = argparse.Namespace
+GROUPS = (RELATED[0] + RELATED[3], RELATED[1] + RELATED[2])
+"""Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
+decides symbols and inlining. What both compile is that of the first."""
 
 
 def warm_kernels(options: Options) -> None:
@@ -77,6 +90,42 @@ def _compile_groups(folder: Path, surroundings: Mapping[str, str], options: Opti
             raise ValueError("not every kernel was compiled")
         for part in reversed(parts):
             shutil.copytree(part, folder, dirs_exist_ok=True)
+
+
+def call_group(index: int) -> None:
+    """Call the steps of one of `GROUPS`, and compile what only `compare` asks; on one core, so that no other thread
+    compiles: the order in which functions are compiled is part of their names."""
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[index % len(cores)]})
+    with suppress(ImportError, AttributeError):  # without it kernels are as right
+        from engine.compiling.compilers import forget_paths
+
+        forget_paths()
+    for step in GROUPS[index]:
+        STEPS[step]()
+    if index == len(GROUPS) - 1:
+        warm_textbook()
+
+
+def warm_textbook() -> None:
+    """Ask every textbook method that `compare` offers; not a step, since hardly anybody asks more than one."""
+    from engine.textbook import methods
+
+    for dimension in (2, 3):
+        points = as_points(np.linspace(-0.5, 1.5, 6 * dimension).reshape(-1, dimension), dimension)
+        corners = np.eye(3)[:, :dimension]
+        terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
+        for solid in (*regions_of(dimension), Triangle(corners), terms, Csg("union", regions_of(dimension)[:3])):
+            questions: list[tuple[methods.Methods, tuple[Any, ...]]] = [
+                (methods.of_points(solid), (points,)),
+                (methods.of_segments(solid), (points.reshape(3, 2, dimension),)),
+                (methods.of_polygons(solid), (points.reshape(2, 3, dimension),)),
+                (methods.of_pairs(solid, solid), ()),
+            ]
+            for offered, arguments in questions:
+                for ask, _ in offered.values():
+                    ask(*arguments)
 
 
 class _Lines:

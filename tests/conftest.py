@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import engine
-from engine import warm_groups, warmup
+from engine import warm_command, warmup
 from engine.compiling import jit, kernel_cache, sources
 from engine.compiling.cold_start import fill_cache, has_all
 
@@ -69,7 +69,7 @@ def data() -> Path:
 def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A seed of all kernels: a copy of the one in use, if it has all, else from the cache, which is filled first."""
     engine.warm(processes=os.cpu_count() or 1)
-    warm_groups.warm_textbook()
+    warm_command.warm_textbook()
     folder, seed = tmp_path_factory.mktemp("kernels") / "seed", kernel_cache.seed()
     source = seed if seed is not None and has_all(seed, "engine.warmup") else kernel_cache.cache_folder()
     assert source is not None

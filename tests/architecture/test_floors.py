@@ -33,7 +33,6 @@ FLOORS = {
     "engine.compare": 11,
     "engine.distributed": 11,
     "engine.files": 11,
-    "engine.warm_groups": 12,
     "engine.warmup": 11,
     "engine.inspection": 12,
     "engine": 13,

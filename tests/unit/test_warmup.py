@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import engine
-from engine import warm_groups, warmup
+from engine import warm_command, warmup
 from engine.warmup import STEPS
 from tests.programs import COUNTER
 
@@ -142,7 +142,7 @@ def test_any_step_may_be_the_first(tmp_path: Path, step: str) -> None:
 
 
 def test_steps_are_all_in_some_group_and_some_operation() -> None:
-    assert sorted(step for group in warm_groups.GROUPS for step in group) == [*range(len(STEPS))]
+    assert sorted(step for group in warm_command.GROUPS for step in group) == [*range(len(STEPS))]
     assert {step for steps in warmup.OPERATIONS.values() for step in steps} == {*STEPS}
     assert len(warmup.SHARES) == len(STEPS)
     assert all(hasattr(engine, name) for name in warmup.OPERATIONS)
