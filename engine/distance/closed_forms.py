@@ -295,12 +295,13 @@ def is_power_of_two(x: float) -> bool:
 
 
 @inline
-def sum_of_three(a: float, b: float, c: float) -> tuple[Wide, bool]:
-    """Return a + b + c, and whether it is exact."""
-    total, lost = two_sum(a, b)
+def value_on_axis(d: float, n: float, x: float, y: float) -> tuple[Wide, bool]:
+    """Return d + n x + n y, and whether it is exact. n: a power of two, within 2^-200 .. 2^200 in magnitude."""
+    b, c = n * x, n * y
+    total, lost = two_sum(d, b)
     total, lost_too = two_sum(total, c)
     rest, lost = two_sum(lost, lost_too)
-    return Wide(*two_sum(total, rest)), lost == 0.0
+    return Wide(*two_sum(total, rest)), lost == 0.0 and b / n == x and c / n == y  # else products underflow
 
 
 @inline
@@ -312,7 +313,9 @@ def gap_of_values(value: Wide, square: Wide, slack: float, radius: float) -> flo
     if not (2.0**-400 < square.h < 2.0**400 and slack < 2.0**500):
         return UNSURE
     norm = root(square)
-    if slack == 0.0 and radius == 0.0 and not 0.0 < -value.h < 2.0**-500:
+    if slack == 0.0 and 0.0 < -value.h < 2.0**-500:
+        return UNSURE  # case: quotients underflow
+    if slack == 0.0 and radius == 0.0:
         return max(-value.h / norm.h, 0.0) + 0.0
     away = over(value, norm)
     distance = less(Wide(-away.h, -away.low), Wide(radius, 0.0))
@@ -347,7 +350,7 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
     slack = 32.0 * U2 * terms + size * error + _PLANE_TINY
     if n_axes == 1 and error == 0.0 and is_power_of_two(row[axis]):
         x = _wide(w, 4 * axis + (2 if row[axis] > 0.0 else 0))
-        total, is_exact = sum_of_three(row[d], row[axis] * x.h, row[axis] * x.low)
+        total, is_exact = value_on_axis(row[d], row[axis], x.h, x.low)
         if is_exact:
             value, slack = total, 0.0
     distance = UNSURE

@@ -31,8 +31,8 @@ from engine.distance.closed_forms import (
     less,
     plus,
     product,
-    sum_of_three,
     times,
+    value_on_axis,
 )
 from engine.distance.spreads import radius_of
 from engine.predicates.error_free import U2, workspace
@@ -125,6 +125,12 @@ def _along_axis(row: FloatArray, turn: FloatArray) -> tuple[int, int]:
     return (axis, source) if source >= 0 else (-1, -1)
 
 
+@inline
+def _is_higher(vertices: FloatArray, vertex: int, other: int, axis: int, weight: float) -> bool:
+    x, y = vertices[vertex, axis], vertices[other, axis]
+    return x > y if weight > 0.0 else x < y
+
+
 @called
 def _nearest(
     row: FloatArray, vertices: FloatArray, turn: FloatArray, move: FloatArray, reach: FloatArray
@@ -155,21 +161,20 @@ def _nearest(
         x, y, z = vertices[vertex, 0], vertices[vertex, 1], (vertices[vertex, 2] if d == 3 else 0.0)
         if not w[0] * x + w[2] * y + w[4] * z >= highest:
             continue
-        if source >= 0 and best >= 0 and (vertices[vertex, source] - vertices[best, source]) * w[2 * source] <= 0.0:
+        if source >= 0 and best >= 0 and not _is_higher(vertices, vertex, best, source, w[2 * source]):
             continue  # case: along an axis equal values are equal coordinates
         here = plus(level, times(Wide(w[0], w[1]), Wide(x, 0.0)))
         here = plus(here, times(Wide(w[2], w[3]), Wide(y, 0.0)))
         here = plus(here, times(Wide(w[4], w[5]), Wide(z, 0.0)))
-        if here.h > most.h or (here.h == most.h and here.low > most.low):
+        if source >= 0 or here.h > most.h or (here.h == most.h and here.low > most.low):
             most, second, best = here, most, vertex
         elif here.h > second.h or (here.h == second.h and here.low > second.low):
             second = here
-        elif source >= 0:
-            most, best = here, vertex
     if source < 0:
         return most, slack, best if less(most, second).h > 2.0 * slack else -1
     if best >= 0 and is_power_of_two(row[axis]):
-        value, is_exact = sum_of_three(row[d], w[2 * source] * vertices[best, source], row[axis] * move[axis])
+        turned = vertices[best, source] * turn[axis, source]
+        value, is_exact = value_on_axis(row[d], row[axis], turned, move[axis])
         if is_exact:
             return value, 0.0, best
     return most, slack, best

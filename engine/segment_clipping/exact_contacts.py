@@ -107,12 +107,12 @@ def exact_codes(s: Exact, elements: FloatArray, element: int, line: Line, item: 
         ab = forth * ab if ab != 0 else _side_when_perturbed(s, 0)
         bc = forth * bc if bc != 0 else _side_when_perturbed(s, 1)
         ca = forth * ca if ca != 0 else _side_when_perturbed(s, 2)
-        if ab * bc * ca == 0 or s.state[IS_LONG] != 0:
+        if ab * bc * ca == 0:
             return Kind.DEGENERATE
         is_crossed = ab == bc and bc == ca
     if of_start == 0 or beyond == 0:
         place = AT_START if of_start == 0 else AT_END
-    return code_of(place, is_crossed)
+    return Kind.DEGENERATE if s.state[IS_LONG] != 0 else code_of(place, is_crossed)
 
 
 @called

@@ -100,6 +100,30 @@ def test_a_sum_of_three_doubles_in_the_middle_of_two_is_rounded_to_the_even_one(
             assert (found.distance, found.points[0][2], found.points[1][2]) == (expected, z, -1.0)
 
 
+@pytest.mark.parametrize(
+    ("n", "unit"), [(0.5, 5e-324), (0.25, 5e-324), (2.0**-100, 2.0**-1000), (2.0**-199, 2.0**-900)]
+)
+def test_products_that_underflow_are_not_taken_as_exact(n: float, unit: float) -> None:
+    """They were: bodies apart were 0.0 or four units apart, and lower vertices as near."""
+    ground = HalfSpace([0.0, 0.0, n], 0.0)
+    sheet, box = Surface([[0, 0, -5 * unit], [1, 0, -3 * unit], [0, 1, -5 * unit]], [[0, 1, 2]]), [1.0, 1.0, -3 * unit]
+    for solid in (sheet, Aabb([0, 0, -1], box), Sphere(box, 0.0)):
+        found: Any = clearance(ground, solid)
+        assert (found.distance, found.points[1][2]) == (3 * unit, -3 * unit)
+        assert clearance_poses(ground, solid, [Pose(np.eye(3), [0, 0, 0])]).tolist() == [3 * unit]
+    found = clearance(HalfSpace([0.0, 0.0, n], -1.0), sheet)
+    assert found.features[1].indices == (1,)
+
+
+def test_vertices_that_double_doubles_do_not_tell_apart_are_told_by_their_coordinates() -> None:
+    move = [0.0, 0.0, -(2.0**-60)]
+    for low, high in ((0, 1), (1, 0)):
+        heights = [-(2.0**-200), -(2.0**-300)] if low == 0 else [-(2.0**-300), -(2.0**-200)]
+        sheet = Surface([[0, 0, heights[0]], [1, 0, heights[1]], [0, 1, -1]], [[0, 1, 2]])
+        found: Any = clearance(HalfSpace([0.0, 0.0, 1.0], -1.0), sheet, second_pose=Pose(np.eye(3), move))
+        assert found.features[1].indices == (high,)
+
+
 def test_balls_boxes_and_gaps_of_scenes_take_the_same_way() -> None:
     rng = random.Random(5)
     for _ in range(20):

@@ -238,6 +238,16 @@ def test_bodies_that_are_met_at_one_place_stand_in_their_order() -> None:
         engine.Scene([SHEET, engine.Sphere([0, 0, 0], 1)]).hits([[[1, 2, 1], [1, 2, 0]]])
 
 
+@pytest.mark.parametrize("is_ray", [False, True])
+def test_the_first_hit_is_one_where_the_line_runs_along_a_face(is_ray: bool) -> None:
+    """All hits of such a line were returned."""
+    wall = engine.Surface([*CORNERS, [8, 0, -1], [8, 4, -1], [8, 2, 9]], [*QUADS, [8, 9, 10]])
+    line = [[[-4, 2, 0], [16, 0, 0] if is_ray else [12, 2, 0]]]
+    every, first = (engine.hits(line, wall, rays=is_ray, keep=keep) for keep in ("all", "first"))
+    assert every.t.tolist() == [0.25, 0.75]
+    assert (first.t.tolist(), first.t_end.tolist(), first.kind.tolist()) == ([0.25], [0.5], [HitKind.ALONG])
+
+
 def test_segments_clipped_on_a_surface_are_sent_here() -> None:
     with pytest.raises(engine.UnsupportedSolidError, match="hits tells where segments meet a surface"):
         engine.clip_segments([[[1, 2, 1], [1, 2, 0]]], SHEET)
