@@ -133,12 +133,14 @@ def _keys_of_pairs(
     grid = grid or (_build_grid(low, high, budget, workers) if n_boxes >= _FEWEST else None)
     grid = grid or _sorted_along_axis(low, high)
     n_parts = 1 if n_boxes < _PARTED or workers == 1 else _N_PARTS
-    parts = list(pairwise(n_boxes * part // n_parts for part in range(n_parts + 1)))
+    parts, n_taken = list(pairwise(n_boxes * part // n_parts for part in range(n_parts + 1))), 1
     while parts:  # bound: each turn ends a part, or lists pairs
-        keys = _keys_of_parts(grid, parts, max(block // n_parts, 1), -1 if n_left is None else n_left, budget, workers)
+        some, parts = parts[:n_taken], parts[n_taken:]
+        keys = _keys_of_parts(grid, some, max(block // n_parts, 1), -1 if n_left is None else n_left, budget, workers)
         if len(keys):
             yield keys
-        parts = [part for part in parts if part[0] < part[1]]
+        parts = [part for part in some if part[0] < part[1]] + parts
+        n_taken = max(1, min(8 * n_taken, n_taken * block // max(len(keys), 1), n_parts))  # one box may meet all others
 
 
 def _keys_of_parts(

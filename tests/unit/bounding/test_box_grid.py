@@ -55,10 +55,19 @@ def test_parts_of_many_boxes_by_threads(workers: int, monkeypatch: pytest.Monkey
     low = rng.uniform(0, 12, (1500, 3))
     high = low + rng.uniform(0.2, 1.2, low.shape)
     expected = brute_force(low, high)
-    assert all_pairs(pairs_of_boxes(low, high, Budget(), workers=workers)) == expected
-    blocks = list(pairs_of_boxes(low, high, Budget(), 640, workers=workers))
-    assert all(block.tolist() == sorted(block.tolist()) for block in blocks)
-    assert sorted(all_pairs(blocks)) == expected
+    for size in (1 << 18, 640):
+        blocks = list(pairs_of_boxes(low, high, Budget(), size, workers=workers))
+        assert all(block.tolist() == sorted(block.tolist()) for block in blocks)
+        assert sorted(all_pairs(blocks)) == expected
+
+
+@pytest.mark.parametrize("workers", [1, 2, 16])
+def test_a_block_of_boxes_that_all_meet_has_the_pairs_of_few_of_them(workers: int) -> None:
+    """Each part of the boxes may list all pairs of one box: 64 parts at once gave blocks of a million pairs."""
+    low, block = np.zeros((1 << 14, 3)), 1 << 15
+    with Budget() as budget:
+        blocks = pairs_of_boxes(low, low + 1.0, budget, block, workers=workers)
+        assert all(len(part) < block + len(low) for _, part in zip(range(20), blocks))
 
 
 def test_a_cancelled_call_ends() -> None:
