@@ -240,7 +240,9 @@ def _warm_scene_clipping_2d() -> None:
 
 
 def _warm_scene_clipping_3d() -> None:
-    _clip_scene([*regions_of(3), *_bodies()[1:2]], Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0]))
+    pose = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
+    _clip_scene([*regions_of(3), *_bodies()[1:2]], pose)
+    Scene([_cube()], [pose]).clip_segments([np.array([[0.0, 0, 0], [1.0, 0, 0]]) @ pose.rotation.T + pose.translation])
 
 
 def _clip_scene(some: list[Solid], pose: Pose) -> None:

@@ -111,12 +111,12 @@ def ring_of_vertices(offsets: IntArray) -> IntArray:
 
 
 def ring_sizes(rings: PairResults) -> FloatArray:
-    """Return, by ring, half the sum of width and height of its box."""
+    """Return, by ring, a quarter of the sum of width and height of its box: below the largest double."""
     starts = rings.ring_offsets[:-1]
     if not len(starts):
         return np.zeros(0)
     low, high = np.minimum.reduceat(rings.vertices, starts), np.maximum.reduceat(rings.vertices, starts)
-    return cast("FloatArray", (high / 2 - low / 2).sum(axis=1))
+    return cast("FloatArray", (high / 4 - low / 4).sum(axis=1))
 
 
 _FEW: Final = 16

@@ -187,6 +187,10 @@ def test_ends_of_the_exponent_range() -> None:
     assert_valid(result)
     with pytest.raises(NotRepresentableError):
         _ = result.area
+    most = 1.7976931348623157e308  # width and height together are beyond it
+    left = Polygon([[(0.0, 0.0), (0.0, 1.0), (-most, 0.0)]])
+    below = Polygon([[(0.0, 0.0), (0.0, -1.7976931348623155e308), (-1.0, 2.9937604643020797e292)]])
+    assert_valid(overlay(left, below, "union"))
     denormal = overlay(
         Polygon([[(0, 0), (3 * tiny, tiny), (3 * tiny, 0)]]), Polygon([box(tiny, -tiny, tiny, 3 * tiny)])
     )
