@@ -40,6 +40,7 @@ from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
 from engine.solids.primitives import Aabb, HalfSpace, Sphere
+from engine.solids.ragged import ascending
 from engine.types import FlagArray, FloatArray, IntArray, read_only
 
 _TINY: Final = 2.0**-1060
@@ -79,7 +80,7 @@ def corners_of(body: Solid) -> tuple[FloatArray, IntArray]:
 
     def build() -> tuple[FloatArray, IntArray]:
         if isinstance(body, Mesh):
-            numbers = np.unique(body.triangles)
+            numbers = ascending(body.triangles)
             return (body.vertices if len(numbers) == len(body.vertices) else read_only(body.vertices[numbers])), numbers
         if isinstance(body, Aabb):
             numbers = np.arange(1 << body.dimension)

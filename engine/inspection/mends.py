@@ -21,6 +21,7 @@ from engine.errors import EngineError
 from engine.running.budget import Budget, polled
 from engine.solid_cutting.faults import edges_of, junctions, shells_of, sign_of_volume
 from engine.solids.mesh import Polyhedron
+from engine.solids.ragged import ascending
 from engine.types import FloatArray, IntArray, Rcc8
 
 
@@ -30,7 +31,7 @@ def welded(
     """Merge vertices within `distance` of each other, also through chains of such vertices: return the points,
     unchanged, and the faces with the smallest index of each group in place of its members, collapsed faces left out.
     What was done is appended to `mended`."""
-    used = np.unique(faces)
+    used = ascending(faces)
     spots = points[used]
     with np.errstate(over="ignore"):  # boxes and distances beyond the largest double
         low, high = (np.nextafter(spots + sign * distance / 2, sign * np.inf) for sign in (-1, 1))
@@ -138,7 +139,7 @@ class _Shell:
 
     def __init__(self, points: FloatArray, faces: IntArray, part: IntArray) -> None:
         self.points, self.faces, self.part = points, faces[part], part
-        self.vertices = np.unique(self.faces)
+        self.vertices = ascending(self.faces)
         self.low, self.high = (pick(points[self.vertices], axis=0) for pick in (np.min, np.max))
         self.is_odd = (self.faces == np.roll(self.faces, 1, axis=1)).any(axis=1)
         """Of triangles that name a vertex twice: they use each edge both ways."""

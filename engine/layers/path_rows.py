@@ -36,7 +36,7 @@ from engine.running.budget import Budget
 from engine.scenes.clip import loose_pieces, sorted_exactly
 from engine.scenes.ends import LoosePieces, merge_parts, take_pieces
 from engine.scenes.scene import Scene
-from engine.solids.ragged import closed_rings, next_in_rings, summed
+from engine.solids.ragged import ascending, closed_rings, next_in_rings, summed
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
@@ -102,7 +102,7 @@ def _clip_areas(layer: MixedLayer, pieces: PolygonArrays, limits: Limits, with_t
     inside = own[:0]
     if limits.grid is None and len(own):
         with suppress(NotRepresentableError):  # beyond the range of exact signs all are cut
-            met, inside = (np.unique(related_pairs(layer, other, "intersects", 0.0, limits)[:, 0])
+            met, inside = (ascending(related_pairs(layer, other, "intersects", 0.0, limits)[:, 0])
                            for other in (_outline_of(pieces), layer_of_areas(whole)))  # fmt: skip
             cut = np.union1d(met, layer.prepared.get("cleaned", own[:0]))
             own, inside = np.intersect1d(own, cut), np.intersect1d(own, np.setdiff1d(inside, cut))

@@ -34,7 +34,7 @@ from engine.scenes.point_queries import locate_scene
 from engine.solids.accepted import PointsLike
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import closed_rings, summed
+from engine.solids.ragged import ascending, closed_rings, summed
 from engine.types import BoolArray, FloatArray, IntArray
 
 HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
@@ -227,7 +227,7 @@ def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, lim
     low, high = parts.boxes(several)
     of = owner[several]
     pairs = several[limits.pairs_of_boxes(low, high, lambda pairs: of[pairs[:, 0]] == of[pairs[:, 1]])]
-    overlapping = np.unique(owner[pairs[pairs_overlap(parts, pairs, limits), 0]])
+    overlapping = ascending(owner[pairs[pairs_overlap(parts, pairs, limits), 0]])
     if len(overlapping):
         those = [
             unite(PolygonSelection(parts, np.arange(offsets[k], offsets[k + 1])), limits) for k in overlapping.tolist()

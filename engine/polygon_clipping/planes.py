@@ -29,6 +29,7 @@ from engine.solids.checks import digits
 from engine.solids.convexity import convexity
 from engine.solids.mesh import Polyhedron
 from engine.solids.primitives import Aabb, Convex, HalfSpace, rows_of
+from engine.solids.ragged import ascending
 from engine.solids.registry import refused, row_of
 from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray, Location, read_only
 
@@ -149,7 +150,7 @@ def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:
     vertices, triangles = region.vertices, region.triangles
     if (certificate := convexity(region)) is not None:
         return triangles if certificate.is_outward else triangles[:, ::-1]
-    used = np.unique(triangles)
+    used = ascending(triangles)
     behind, before = np.zeros(len(triangles), bool), np.zeros(len(triangles), bool)
     step = max(1, _BATCH // len(used))
     for first in range(0, len(triangles), step):

@@ -32,6 +32,7 @@ from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.scenes.pair_groups import grouped, of_one_pose, runs_of, settle_pairs
 from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.columns import Columns
+from engine.solids.ragged import are_among, ascending
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
 
 _FEW_PAIRS: Final = 8
@@ -290,9 +291,9 @@ def _candidates(
     if wanted is None:
         blocks = pairs_of_boxes(low, bodies.high, budget, workers=workers)
     else:
-        blocks = _meeting(low, bodies.high, np.unique(wanted))
+        blocks = _meeting(low, bodies.high, wanted)
     for pairs in blocks:
-        yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
+        yield pairs if skipped is None else pairs[~are_among(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
 
 
 def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntArray]:
@@ -304,8 +305,9 @@ def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntA
 
 
 def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
-    """Return the keys first * n_bodies + second, first < second, of the caller's pairs `named`. name: of the argument,
-    for errors. Raises InvalidArrayError or IndexOutOfRangeError for what is no array of pairs of bodies."""
+    """Return the keys first * n_bodies + second, first <= second, of the caller's pairs `named`, each once, ascending.
+    name: of the argument, for errors. Raises InvalidArrayError or IndexOutOfRangeError for what is no array of pairs of
+    bodies."""
     try:
         array = np.asarray(named)
     except ValueError:
@@ -321,9 +323,9 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
         row = int(wrong[0])
         message = f"{name}[{row}] = {array[row].tolist()} names a body that is not there; the scene has {n_bodies}"
         raise IndexOutOfRangeError(message, (name, row))
-    array = np.sort(array.astype(np.int64), axis=1)
-    keys: IntArray = array[:, 0] * n_bodies + array[:, 1]
-    return keys
+    first, second = array.astype(np.int64).T
+    budget.check()
+    return ascending(np.minimum(first, second) * n_bodies + np.maximum(first, second))
 
 
 _STRETCHED: Final = 1.0 + 2.0**-38

@@ -25,6 +25,7 @@ from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.base import Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, check_finite, shown
 from engine.solids.pose import Pose
+from engine.solids.ragged import are_among
 from engine.types import Accuracy, BoolArray, FloatArray
 
 _BYTES_OF_POSE: Final = 1000
@@ -205,9 +206,9 @@ class Scene(PointQueries):
             relations = np.full(len(met), TOUCHING, np.int8) if query.boolean else relations[order]
             return ScenePairs(first, second, relations), Accuracy("exact", None, len(keys), 0, 0, "named pairs")
         if query.only is not None:
-            keys = keys[np.isin(keys, pair_keys(query.only, n, "only", budget))]
+            keys = keys[are_among(keys, pair_keys(query.only, n, "only", budget))]
         if query.skip is not None:
-            keys = keys[~np.isin(keys, pair_keys(query.skip, n, "skip", budget))]
+            keys = keys[~are_among(keys, pair_keys(query.skip, n, "skip", budget))]
         pairs = np.stack(np.divmod(keys, n), axis=1)
         bodies, local = np.unique(pairs, return_inverse=True)
         query = query._replace(skip=None, only=local.reshape(-1, 2))

@@ -32,6 +32,7 @@ from engine.running.budget import Budget, polled
 from engine.solid_cutting.caps import Seen, cap_of, seen
 from engine.solid_cutting.faults import crossings
 from engine.solid_cutting.plane_cut import Plane, Points, are_different, plane_through, stops_of
+from engine.solids.ragged import ascending
 from engine.types import BoolArray, FloatArray, IntArray
 
 _NO_JUNCTIONS: Final = np.zeros((0, 3), np.int64)
@@ -113,7 +114,7 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     involved[np.concatenate([contacts.flush.ravel(), contacts.along[:, [0, 3]].ravel()])] = True
     involved |= contacts.is_flat
     budget.check()
-    places = {reduced(points.exact(number)): number for number in polled(np.unique(faces[involved]).tolist())}
+    places = {reduced(points.exact(number)): number for number in polled(ascending(faces[involved]).tolist())}
     cells: list[tuple[int, Sides]] = []
     n_given, n_known = len(points), len(places)
 
@@ -130,7 +131,7 @@ def conformed(points: Points, faces: IntArray, contacts: Contacts, budget: Budge
     points.add_places([*places][n_known:], budget)
     sides: IntArray = np.concatenate([faces[involved][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2),
                             np.array([side for _, own in cells for side in own], np.int64).reshape(-1, 2)])  # fmt: skip
-    spots = np.concatenate([np.unique(faces[involved]), np.arange(n_given, len(points))])
+    spots = np.concatenate([ascending(faces[involved]), np.arange(n_given, len(points))])
     on = points.on_sides(np.unique(np.sort(sides, axis=1), axis=0), spots, budget)
     ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     n = len(points)

@@ -38,6 +38,7 @@ from engine.solid_cutting.exact_measures import (
 )
 from engine.solid_cutting.plane_cut import Plane, Points
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
+from engine.solids.ragged import ascending
 from engine.types import FloatArray, IntArray, read_only
 
 _BITS: Final = (80, 128, 512, 2048)
@@ -111,7 +112,7 @@ def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: 
     rows = others.tolist()
 
     def ends_of(bits: int) -> tuple[Fraction, Fraction]:
-        places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
+        places, k, most = _cut_off(points, ascending(others).tolist(), bits)
         base = Fraction(z0) * Fraction(2) ** k
         z_unit, z_rest = base.numerator // base.denominator, base.denominator
         total = 0
@@ -175,7 +176,7 @@ def nearest_area(points: Points, triangles: IntArray, budget: Budget) -> tuple[f
     rows = others.tolist()
 
     def ends_of(bits: int) -> tuple[Fraction, Fraction]:
-        places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
+        places, k, most = _cut_off(points, ascending(others).tolist(), bits)
         total = 0
         for i, j, m in polled(rows):
             a = places[i]

@@ -22,6 +22,7 @@ from engine.running.budget import Budget, polled
 from engine.solid_cutting.exact_measures import exact_faces, exact_volume
 from engine.solid_cutting.face_cuts import find_candidates
 from engine.solid_cutting.plane_cut import Points
+from engine.solids.ragged import ascending
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
@@ -78,7 +79,7 @@ def are_flat(points: FloatArray, faces: IntArray, budget: Budget) -> Any:
 def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
     """Return the T-junctions (k, 3) of open edges `ends` (n, 2): an edge, and a vertex of another one that lies exactly
     in its interior; vertices of one edge in their order along it."""
-    on = Points(points).on_sides(ends, np.unique(ends), budget) if len(ends) else {}
+    on = Points(points).on_sides(ends, ascending(ends), budget) if len(ends) else {}
     rows = [(*side, number) for side in sorted(on) for number in on[side]]
     return np.array(rows, np.int64).reshape(-1, 3)
 

@@ -79,6 +79,22 @@ def summed(sizes: Sequence[int] | IntArray | BoolArray) -> IntArray:
     return read_only(offsets)
 
 
+def ascending(numbers: IntArray) -> IntArray:
+    """Return each integer of an array once, in order; np.unique, by a hash table from numpy 2.3 on, takes up to 70
+    times as long for millions."""
+    flat = np.sort(numbers, axis=None)
+    distinct: IntArray = flat[np.append(np.True_, flat[1:] != flat[:-1])[: len(flat)]]
+    return distinct
+
+
+def are_among(numbers: IntArray, known: IntArray) -> BoolArray:
+    """Return, for each integer (n,), whether it is among known (m,), which ascend."""
+    if not len(known):
+        return np.zeros(len(numbers), np.bool_)
+    result: BoolArray = known[np.minimum(np.searchsorted(known, numbers), len(known) - 1)] == numbers
+    return result
+
+
 def within(offsets: IntArray, items: IntArray) -> IntArray:
     """Return, by item number, the group that contains it: group g has the items offsets[g] .. offsets[g + 1] - 1."""
     return np.searchsorted(offsets, items, "right") - 1

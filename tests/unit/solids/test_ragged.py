@@ -13,7 +13,7 @@ import engine
 from engine import Polygon, overlay, overlay_batch, polygons
 from engine.errors import InvalidArrayError, NotFiniteError, RingTooShortError, WrongDimensionError
 from engine.polygon_overlay.pair_arrays import PolygonSelection, arrays_of, concatenate_polygons
-from engine.solids.ragged import closed_rings
+from engine.solids.ragged import are_among, ascending, closed_rings
 
 SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
 HOLE = [[1.0, 1.0], [1.0, 2.0], [2.0, 2.0]]
@@ -115,3 +115,12 @@ def test_shapely_passes_through() -> None:
     batch: Any = overlay_batch(sides[:-1], sides[1:])
     found = shapely.from_ragged_array(shapely.GeometryType.MULTIPOLYGON, *batch.ragged)
     assert shapely.equals(found, shapely.intersection(shapes[:-1], shapes[1:])).all()
+
+
+@pytest.mark.parametrize("shape", [(0,), (1,), (40,), (12, 3)])
+def test_integers_once_in_order_and_which_are_among_them(shape: tuple[int, ...]) -> None:
+    numbers = np.random.default_rng(1).integers(-9, 9, shape)
+    once = ascending(numbers)
+    assert once.tolist() == sorted(set(numbers.ravel().tolist()))
+    asked = np.arange(-12, 12)
+    assert are_among(asked, once).tolist() == [k in once.tolist() for k in asked.tolist()]
