@@ -156,8 +156,12 @@ def _keys_of_parts(
             n, start = entry_of(_collect_pairs)(grid, *parts[part], enough, n_left, keys, budget.flag)
             listed[part], parts[part] = np.sort(keys[:n]), (start, parts[part][1])
 
+    if len(parts) == 1:
+        collect(0, 1)
+        budget.check()
+        return listed[0]
     run_chunks(collect, len(parts), budget=budget, first_chunk=1, workers=workers)
-    return listed[0] if len(listed) == 1 else np.sort(np.concatenate(listed), kind="stable")
+    return np.sort(np.concatenate(listed), kind="stable")
 
 
 @np.errstate(all="ignore")

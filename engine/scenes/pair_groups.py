@@ -22,8 +22,10 @@ from engine.collision.simple.closed_forms import FORMS
 from engine.running.parallel import Progress, run_chunks
 from engine.types import IntArray
 
-_FEW: Final = 3
+_FEW: Final = 7
 """Most pairs of the same two solids that are decided one by one sooner than by a kernel for many."""
+_FEW_IN_ALL: Final = 64
+"""Most pairs that are decided one by one sooner than put in groups."""
 
 
 def grouped(items: IntArray, keys: IntArray) -> tuple[IntArray, IntArray]:
@@ -56,13 +58,18 @@ def settle_pairs(
         progress(len(pairs) - len(left))
     if not len(left):
         return
-    left, ends = grouped(left, _keys_of(bodies, pairs[left], answers))
+    are_few, ends = len(left) <= _FEW_IN_ALL, left
+    if not are_few:
+        left, ends = grouped(left, _keys_of(bodies, pairs[left], answers))
 
     def pair_of(item: int) -> PlacedPair:
         i, j = pairs[item].tolist()
         return bodies.solids[i], bodies.solids[j], (bodies.poses[i], bodies.poses[j])
 
     def task(start: int, stop: int) -> None:
+        if are_few:
+            answers.settle(left[start:stop], pair_of)
+            return
         for items in runs_of(left, ends, start, stop):
             answers.settle(_relate_group(bodies, pairs, items, answers) if len(items) > _FEW else items, pair_of)
 
