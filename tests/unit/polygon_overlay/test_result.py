@@ -107,7 +107,7 @@ def test_taken_and_joined() -> None:
 
 def test_offsets() -> None:
     assert concatenate_offsets([np.array([0, 2, 5]), np.array([0]), np.array([0, 1])]).tolist() == [0, 2, 5, 6]
-    assert ring_sizes(one_pair(np.array([[0.0, 1], [3, 1], [3, 2]]), np.array([0, 3]), np.array([0, 1]), 0, 0)) == [2]
+    assert ring_sizes(one_pair(np.array([[0.0, 1], [3, 1], [3, 2]]), np.array([0, 3]), np.array([0, 1]), 0, 0)) == [1]
     assert len(ring_sizes(NO_PAIRS)) == 0
 
 
