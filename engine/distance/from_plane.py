@@ -21,6 +21,7 @@ from typing import Final
 
 import numpy as np
 
+from engine.bounding.aabb import corners_of_box
 from engine.collision.simple.form_relations import source_of
 from engine.compiling.jit import called, entry_of, inline, kernel
 from engine.distance.closed_forms import (
@@ -83,9 +84,7 @@ def corners_of(body: Solid) -> tuple[FloatArray, IntArray]:
             numbers = ascending(body.triangles)
             return (body.vertices if len(numbers) == len(body.vertices) else read_only(body.vertices[numbers])), numbers
         if isinstance(body, Aabb):
-            numbers = np.arange(1 << body.dimension)
-            sides = numbers[:, None] >> np.arange(body.dimension) & 1
-            return read_only(np.where(sides, body.max, body.min)), numbers
+            return read_only(corners_of_box(body.min, body.max)), np.arange(1 << body.dimension)
         vertices = body.center[None] if isinstance(body, Sphere) else body.vertices  # type: ignore[attr-defined]
         return read_only(vertices), np.arange(len(vertices))
 

@@ -40,6 +40,7 @@ from engine.segment_clipping.exact_lines import (
     WITHIN,
     Exact,
     load_triangle,
+    put_copy,
     put_difference,
     put_parameter,
     put_pass,
@@ -159,10 +160,8 @@ def _put_weights(s: Exact, code: int, axis: int, weights: FloatArray) -> bool:
         weights[k] = 0.0
     if axis < 0:
         for k in range(3):
-            put_term(s, 0, EDGES + ((k + 1) % 3) * STEP, ONE, 1)
-            put_sum(s, 1, TOP)
-            put_term(s, 0, TOTAL, ONE, 1)
-            put_sum(s, 1, BOTTOM)
+            put_copy(s, EDGES + ((k + 1) % 3) * STEP, TOP)
+            put_copy(s, TOTAL, BOTTOM)
             weights[k], _, is_x = quotient_of(s, TOP, BOTTOM)
             is_sure &= is_x
         return is_sure
@@ -170,10 +169,8 @@ def _put_weights(s: Exact, code: int, axis: int, weights: FloatArray) -> bool:
         weights[place] = 1.0
         return True
     i, j = AXES_BEFORE[axis] * STEP, AXES_BEFORE[axis + 1] * STEP
-    put_term(s, 0, BOTTOM, ONE, 1)
-    put_sum(s, 1, BOTTOM_TOO)
-    put_term(s, 0, TOP, ONE, 1)
-    put_sum(s, 1, TOP_TOO)
+    put_copy(s, BOTTOM, BOTTOM_TOO)
+    put_copy(s, TOP, TOP_TOO)
     for k in range(3):
         if place < Place.START:  # of the ends of a side: the sides of the other ends
             first = place - 3
@@ -243,10 +240,8 @@ def compare_contacts(
     are too long. element, other: the triangles; code, its: the codes of the contacts."""
     set_line(s, line, item)
     put_parameter(s, elements, its, other)
-    put_term(s, 0, TOP, ONE, 1)
-    put_sum(s, 1, TOP_TOO)
-    put_term(s, 0, BOTTOM, ONE, 1)
-    put_sum(s, 1, BOTTOM_TOO)
+    put_copy(s, TOP, TOP_TOO)
+    put_copy(s, BOTTOM, BOTTOM_TOO)
     put_parameter(s, elements, code, element)
     put_term(s, 0, TOP, BOTTOM_TOO, 1)
     put_term(s, 1, TOP_TOO, BOTTOM, -1)

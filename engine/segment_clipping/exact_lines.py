@@ -111,6 +111,12 @@ def _put_turned(s: Exact, m: int, v: int, place: int) -> None:
         put_sum(s, 3, place + i * STEP)
 
 
+@inline
+def put_copy(s: Exact, a: int, place: int) -> None:
+    put_term(s, 0, a, ONE, 1)
+    put_sum(s, 1, place)
+
+
 @called
 def put_difference(s: Exact, a: int, b: int, place: int) -> None:
     put_term(s, 0, a, ONE, 1)
@@ -220,8 +226,7 @@ def put_pass(s: Exact, place: int, axis: int) -> None:
         put_term(s, 0, SCALE, CORNERS + 3 * place * STEP + k, 1)
         put_term(s, 1, START + k, ONE, -1)
         put_sum(s, 2, TOP)
-        put_term(s, 0, WAY + k, ONE, 1)
-        put_sum(s, 1, BOTTOM)
+        put_copy(s, WAY + k, BOTTOM)
     else:
         first, i, j = place - 3, AXES_BEFORE[axis] * STEP, AXES_BEFORE[axis + 1] * STEP
         a, b = CORNERS + 3 * first * STEP, CORNERS + 3 * ((first + 1) % 3) * STEP
@@ -251,8 +256,7 @@ def put_parameter(s: Exact, elements: FloatArray, code: int, element: int) -> in
     load_triangle(s, elements, element)
     if Place.START <= place <= Place.END:
         s.heap[TOP], s.heap[BOTTOM] = 0, 0
-        put_term(s, 0, ONE, ONE, 1)
-        put_sum(s, 1, BOTTOM)
+        put_copy(s, ONE, BOTTOM)
         if place == Place.END:
             put_sum(s, 1, TOP)
         return see_corners(s) if code & Bit.ALONG != 0 else axis
@@ -260,10 +264,8 @@ def put_parameter(s: Exact, elements: FloatArray, code: int, element: int) -> in
         axis = see_corners(s)
         put_pass(s, place, axis)
         return axis
-    put_term(s, 0, VOLUME, ONE, 1)
-    put_sum(s, 1, TOP)
-    put_term(s, 0, TOTAL, ONE, 1)
-    put_sum(s, 1, BOTTOM)
+    put_copy(s, VOLUME, TOP)
+    put_copy(s, TOTAL, BOTTOM)
     _make_positive(s)
     return axis
 
