@@ -18,7 +18,7 @@ from engine.containment.prepared import (
     IN_TREE_A_FACE_OVER,
     SAMPLE,
     cost_in_tree,
-    mean_edges_met,
+    edges_in_slab,
     mean_faces_above,
 )
 from engine.solids.mesh import Polyhedron
@@ -94,7 +94,7 @@ def choose_for_rings(solid: Polygon, n_points: int) -> Choice:
         return Choice.CELLS
     by_pass, by_slabs = _IN_RINGS + _PASS_AN_EDGE * n_edges, np.inf
     if solid.cached("slabs") is not None or seen * by_pass > _SLABS + _SLABS_AN_EDGE * n_edges:
-        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * mean_edges_met(solid)[1])
+        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * edges_in_slab(solid)[0])
     if seen * min(by_pass, by_slabs) > _RING_CELLS + _RING_CELLS_AN_EDGE * n_edges:
         return Choice.CELLS
     return Choice.LISTS if by_slabs < by_pass else Choice.PASS

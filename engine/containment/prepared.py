@@ -161,7 +161,7 @@ def edges_of(solid: Polygon | Triangle) -> Rings:
         xs, ys, runs, box = closed_rings(solid.vertices, solid.ring_offsets)
         x_min, x_max, y_min, y_max = box.tolist()
         flat, offsets = Axis(y_min, y_max, 0.0, 1), np.array([0, len(runs)])
-        return Rings(xs, ys, flat, offsets, runs, (x_min, x_max, y_min, y_max), flat, flat, _NO_STATUSES)
+        return Rings((0, 1), xs, ys, flat, offsets, runs, (x_min, x_max, y_min, y_max), flat, flat, _NO_STATUSES)
 
     return solid.prepared("edges", build)
 
@@ -171,9 +171,11 @@ def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
     raises ends the construction. Cost: some 10 ns an edge, and 16 to 32 bytes."""
 
     def build() -> Rings:
-        edges = edges_of(solid)
+        edges, (met, columns) = edges_of(solid), edges_in_slab(solid)
+        if columns != edges.columns:
+            edges = edges._replace(columns=columns, xs=edges.ys, ys=edges.xs, box=(*edges.box[2:], *edges.box[:2]))
         check()
-        n_slabs = int(len(edges.xs) / max(_LEAST_IN_SLAB, mean_edges_met(solid)[1]))
+        n_slabs = int(len(edges.xs) / max(_LEAST_IN_SLAB, met))
         slabs = make_axis(*edges.box[2:], max(n_slabs, 1))
         offsets = np.zeros(slabs.n_cells + 1, np.int64)
         list_runs(edges.ys, edges.runs, slabs, offsets[1:], np.full(slabs.n_cells, -1), edges.runs, False)
@@ -191,7 +193,8 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
     2^-960. Cost: some 60 ns an edge, and 12 bytes."""
 
     def build() -> Rings:
-        rings, (across, along) = rings_of(solid, check), mean_edges_met(solid)
+        rings, met = rings_of(solid, check), mean_edges_met(solid)
+        across, along = met[rings.columns[0]], met[rings.columns[1]]
         x_min, x_max, y_min, y_max = rings.box
         if min(x_max * 0.5 - x_min * 0.5, y_max * 0.5 - y_min * 0.5) < _SMALLEST:
             return rings
@@ -201,8 +204,8 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
         n_u = min(max(int((n_cells * along / across) ** 0.5), 1), _MOST_ALONG)
         u, v = make_axis(x_min, x_max, n_u), make_axis(y_min, y_max, min(max(n_cells // n_u, 1), _MOST_ALONG))
         statuses = np.zeros(u.n_cells * v.n_cells, np.int8)
-        edges, placed = edges_of(solid), rings._replace(u=u, v=v)
-        mark_cells(edges.xs, edges.ys, edges.runs, u, v, statuses, flag)
+        placed = rings._replace(u=u, v=v)
+        mark_cells(rings.xs, rings.ys, edges_of(solid).runs, u, v, statuses, flag)
         check()
         propagate_locations(placed, statuses, flag)
         check()
@@ -224,6 +227,13 @@ def mean_edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
         return means[0], means[1]
 
     return solid.prepared("edges_met", find)
+
+
+def edges_in_slab(solid: Polygon | Triangle) -> tuple[float, tuple[int, int]]:
+    """Return how many edges a ray's line meets on average, and which coordinates are along the ray and across it: see
+    `Rings`. Vertical rays only where their lines meet less than half as many."""
+    vertical, horizontal = mean_edges_met(solid)
+    return (vertical, (1, 0)) if vertical * 2.0 < horizontal else (horizontal, (0, 1))
 
 
 EXACT: Final = np.zeros(0)

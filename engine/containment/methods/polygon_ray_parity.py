@@ -9,9 +9,10 @@ The ray goes right from q, moved up by an infinitesimal eps (simulation of simpl
 | horizontal | never crossed, tested for BOUNDARY only |
 
 Edges are listed as runs, from one vertex of a ring to another: whole rings, or the parts of them in a horizontal slab
-(prepared.py). The filter goes over all edges of a run without branches, so that the compiler vectorises it; the edges
-are decided one by one if the sign at a crossed edge is uncertain or a vertex has the height of q. A grid of cells, if
-built, knows the location of all points of most cells.
+(prepared.py). Where horizontal lines meet far more edges than vertical ones, x and y change places: rays go up. The
+filter goes over all edges of a run without branches, so that the compiler vectorises it; the edges are decided one by
+one if the sign at a crossed edge is uncertain or a vertex has the height of q. A grid of cells, if built, knows the
+location of all points of most cells.
 
 A point may have a blur, a bound on its coordinates' error as in methods/filters.py; what it leaves open is UNDECIDED.
 
@@ -29,7 +30,6 @@ from engine.bounding.box_grid import Axis, cell_of
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact, orient2d_filter
-from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point2
 
 MISSED, CROSSED, ON_EDGE = 0, 1, 3
@@ -41,6 +41,8 @@ MIXED: Final = 2
 class Rings(NamedTuple):
     """Edges of a polygon, listed by horizontal slab, for rays to the right; the grid of cells is optional."""
 
+    columns: tuple[int, int]
+    """Which coordinates of a point are x and y here: (0, 1), or (1, 0) where they have changed places."""
     xs: FloatArray
     """x of the vertices of all rings, each ring closed by its first vertex."""
     ys: FloatArray
@@ -146,8 +148,9 @@ def locate_in_runs(
 def _write_cell_statuses(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
     """Fill locations with the status of each point's grid cell, -1 outside the polygon's box; without branches."""
     u, v, (x_min, x_max, y_min, y_max), statuses = rings.u, rings.v, rings.box, rings.statuses
+    xs, ys = points[:, rings.columns[0]], points[:, rings.columns[1]]
     for item in range(len(points)):
-        x, y = points[item, 0], points[item, 1]
+        x, y = xs[item], ys[item]
         is_out = (x < x_min) | (x > x_max) | (y < y_min) | (y > y_max)
         column = cell_of(min(max(x, x_min), x_max), u.low, u.cells_per_unit, u.n_cells)
         row = cell_of(min(max(y, y_min), y_max), v.low, v.cells_per_unit, v.n_cells)
@@ -163,6 +166,7 @@ def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locatio
         return NOT_FINITE
     x_min, x_max, y_min, y_max = rings.box
     slabs, offsets, n_beyond = rings.slabs, rings.offsets, 0
+    xs, ys = points[:, rings.columns[0]], points[:, rings.columns[1]]
     has_cells = len(rings.statuses) > 0 and len(blurs) == 0
     if has_cells:
         _write_cell_statuses(points, rings, locations)
@@ -171,7 +175,7 @@ def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locatio
             continue
         if flag[0]:
             break
-        q, blur = as_point2(points, item), float(blurs[item]) if len(blurs) > 0 else 0.0
+        q, blur = Point2(xs[item], ys[item]), float(blurs[item]) if len(blurs) > 0 else 0.0
         below, above = q.y - blur, q.y + blur
         if q.x + blur < x_min or q.x - blur > x_max or above < y_min or below > y_max:
             locations[item] = -1

@@ -69,8 +69,9 @@ def test_rings_go_from_a_pass_to_slabs_and_cells() -> None:
     assert choose_for_rings(solid, 1000) == Choice.LISTS
     assert choose_for_rings(solid, 10_000) == Choice.CELLS
     teeth = np.arange(5000.0)
-    comb = Polygon([[*np.column_stack([teeth, teeth % 2]).tolist(), [4999, -1], [0, -1]]])
-    assert choose_for_rings(comb, 5000) == Choice.CELLS  # each slab holds all teeth
+    comb = np.array([*np.column_stack([teeth, 5000 * (teeth % 2)]).tolist(), [4999, -1], [0, -1]])
+    assert choose_for_rings(Polygon([comb]), 5000) == Choice.LISTS  # slabs run along the teeth
+    assert choose_for_rings(Polygon([comb @ [[1, 1], [-1, 1]]]), 5000) == Choice.CELLS  # each slab holds half of them
     small = Polygon([circle[::500]])
     assert all(choose_for_rings(small, 10) == Choice.PASS for _ in range(100))
     assert choose_for_rings(solid, 10) == Choice.CELLS  # cells serve few points too

@@ -100,6 +100,15 @@ def test_outlines(outline: Callable[[int, Any], Any], n: int) -> None:
         near = np.nextafter(near, random.choice([-np.inf, np.inf], near.shape))
 
 
+def test_rays_meet_few_edges_of_a_comb_whichever_way_it_lies() -> None:
+    upright = comb(400, None)
+    for vertices, columns in ((upright, (1, 0)), (upright[:, ::-1], (0, 1)), (upright * [1.0, 1e-300], (1, 0))):
+        rings = rings_of(Polygon([vertices]))
+        assert rings.columns == columns
+        lengths = np.diff(rings.runs, axis=1).ravel()
+        assert np.add.reduceat(lengths, rings.offsets[:-1]).max() <= 20
+
+
 @pytest.mark.parametrize("scale", [1.0, 2.0**400, 2.0**-900, 1e-310])
 @pytest.mark.parametrize("offset", [0.0, 1e6, 1e9])
 def test_lattice_rings_that_cross_themselves(scale: float, offset: float) -> None:
