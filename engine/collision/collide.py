@@ -284,8 +284,8 @@ def collide(
         progress(1)
     if not report:
         return answer
-    method = "+".join(sorted({first.type, second.type}))
-    return answer, Accuracy("exact", None, 1, work.n_beyond_filter, work.n_rational, method)
+    work.end_item()
+    return answer, accuracy_of(1, 0, [work], "+".join(sorted({first.type, second.type})))
 
 
 Witnesses = list[result.Witness | None]
@@ -337,12 +337,13 @@ class Answers:
             if self.details is not None and self.details[item] == NO_DETAIL:
                 named = detail_of(*pair, answer.relation, work)
                 self.details[item] = NO_DETAIL if named is None else named
+            work.end_item()
 
 
 def accuracy_of(n_pairs: int, n_open: int, works: list[result.Work], method: str) -> Accuracy:
     """Return the accuracy report of many pairs. n_open: number of pairs that batch kernels left open, all beyond a
     filter; works: counts of the pairs settled one by one."""
-    beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
+    beyond, rational = (sum(some) for some in zip((0, 0), *(work.items for work in works)))
     return Accuracy("exact", None, n_pairs, max(beyond, n_open), rational, method)
 
 

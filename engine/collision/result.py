@@ -160,14 +160,15 @@ class Parts(NamedTuple):
 
 @dataclass(slots=True)
 class Work:
-    """Budget, options and counts of one pair.
+    """Budget, options and counts of pairs decided one after the other.
 
     | field | meaning |
     |---|---|
     | budget | poll `budget.check()` in slow loops; kernels poll `budget.flag` |
     | witness | False if only the relation is wanted |
     | boolean | True if only disjoint or not is wanted: any other relation may be reported as touching |
-    | n_beyond_filter, n_rational | decisions (pairs of faces, points) left open by the filter, by the kernel |
+    | n_beyond_filter, n_rational | decisions of this pair (faces, points) left open by the filter, by the kernel |
+    | items | number of pairs with such decisions: beyond the filter, rational |
     """
 
     budget: Budget = field(default_factory=Budget)
@@ -175,6 +176,13 @@ class Work:
     boolean: bool = False
     n_beyond_filter: int = 0
     n_rational: int = 0
+    items: tuple[int, int] = (0, 0)
+
+    def end_item(self) -> None:
+        """Count the pair that was decided, and begin with the next."""
+        beyond, rational = self.items
+        self.items = beyond + (self.n_beyond_filter > 0), rational + (self.n_rational > 0)
+        self.n_beyond_filter = self.n_rational = 0
 
 
 UNCOUNTED = {(named, boolean): Work(UNLIMITED, named, boolean) for named in (False, True) for boolean in (False, True)}

@@ -316,7 +316,8 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
     if array.size == 0:
         return np.empty(0, np.int64)
     if array.ndim != 2 or array.shape[1] != 2 or array.dtype.kind not in "iu":
-        raise InvalidArrayError(f"{name} must be pairs of indices (n, 2), got shape {array.shape}", (name,))
+        got = f"{array.dtype} values of shape {array.shape}"
+        raise InvalidArrayError(f"{name} must be pairs of integers (n, 2), indices of bodies, got {got}", (name,))
     budget.take(_BYTES * len(array))
     wrong = np.flatnonzero(((array < 0) | (array >= n_bodies)).any(axis=1))
     if len(wrong):

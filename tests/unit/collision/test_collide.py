@@ -248,7 +248,7 @@ def as_json(pose: Pose) -> Solid:
 def test_lattice_poses_need_no_rational_arithmetic() -> None:
     quarter_turn = Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [6, 0, 6])
     _, accuracy = collide(made(HOLLOW), made(HOLLOW), second_pose=quarter_turn, report=True)
-    assert (accuracy.n_rational, accuracy.n_beyond_filter > 0) == (0, True)
+    assert (accuracy.n_rational, accuracy.n_beyond_filter) == (0, 1)
     for _, first, second, expected, _ in CASES:
         found = collide(made(first), made(second), first_pose=quarter_turn, second_pose=quarter_turn)
         assert found.relation.label == expected
@@ -315,7 +315,17 @@ def test_report_and_progress() -> None:
     found, accuracy = collide(made(UNIT), made(moved(UNIT, by=(1, 0, 0))), report=True, progress=seen.append)
     assert found.relation == Relation.TOUCHING
     assert (accuracy.decisions, accuracy.n_items, accuracy.method, seen) == ("exact", 1, "polyhedron", [1])
-    assert accuracy.n_beyond_filter >= accuracy.n_rational >= 0
+    assert (accuracy.n_beyond_filter, accuracy.n_rational) == (1, 0)
+
+
+def test_reports_count_pairs_not_decisions() -> None:
+    tilted = Pose([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 1.0])  # on top, in many faces
+    pairs = [(made(HOLLOW), None), (made(HOLLOW), tilted), (made(UNIT), Pose(np.eye(3), [99.0, 0.0, 0.0]))]
+    _, one = collide(pairs[0][0], pairs[1][0], second_pose=tilted, report=True)
+    _, many = engine.collide_scene([solid for solid, _ in pairs], [pose for _, pose in pairs], report=True)
+    for accuracy in (one, many):
+        assert accuracy.n_items == 1
+        assert accuracy.n_rational <= accuracy.n_beyond_filter <= 1
 
 
 def test_a_solid_is_pickled_without_its_mesh_body() -> None:
