@@ -15,6 +15,10 @@ import numpy as np
 
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
+from engine.collision.meshes.dual_traversal import SEEK_OVERLAP
+from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
+from engine.collision.meshes.mesh_pair import relate
+from engine.collision.result import Work
 from engine.collision.triangles import collide_triangles
 from engine.compiling.cold_start import fill_cache, is_full, note_full
 from engine.compiling.kernel_cache import expect_compiling, warn_of_compiling
@@ -181,6 +185,8 @@ def _warm_cells() -> None:
 
 
 def _warm_poses() -> None:
+    box = mesh_body_of(Aabb([0, 0, 0], [1, 1, 1]))
+    relate(box, box, (STILL, STILL), SEEK_OVERLAP, Work())  # one of the two longest kernels, and little else
     for first in _bodies():
         _collide_under_poses(first)
     turns, moves = np.broadcast_to(np.eye(3), (36, 3, 3)), np.repeat([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]], 12, axis=0)
@@ -292,6 +298,7 @@ def _warm_overlay() -> None:
 
 
 def _warm_overlay_rest() -> None:
+    _warm_layers()  # first what needs no kernel of `_warm_overlay`
     angles = np.linspace(0.0, 2.0 * np.pi, 2048, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
@@ -303,7 +310,6 @@ def _warm_overlay_rest() -> None:
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")
-    _warm_layers()
 
 
 def _warm_layers() -> None:
@@ -340,8 +346,7 @@ def _warm_bounds() -> None:
 
 
 def _warm_clearances() -> None:
-    _collide_under_poses(_cube())  # order: its kernel takes the longest; others are stored meanwhile
-    for body in (_cube(), HalfSpace([0, 0, 1], -9)):
+    for body in (HalfSpace([0, 0, 1], -9), _cube()):
         clearance_poses(body, _cube(), np.eye(3)[None], [[9.0, 0.25, 0.5]])
 
 
@@ -372,35 +377,31 @@ def _notched() -> tuple[Any, Any]:
 
 
 STEPS = (
-    _warm_overlay,
     _warm_poses,
-    _warm_scene_clipping_2d,
-    _warm_clipping_3d,
-    _warm_distances,
-    _warm_flat_bodies,
-    _warm_cutting,
-    _warm_scene_clipping_3d,
-    _warm_bounds,
-    _warm_containment,
+    _warm_overlay,
     _warm_clipping_polygons,
+    _warm_flat_bodies,
+    _warm_clipping_3d,
+    _warm_scene_clipping_2d,
+    _warm_bounds,
+    _warm_hits,
+    _warm_containment,
+    _warm_overlay_rest,
+    _warm_clearances,
+    _warm_distances,
+    _warm_cutting,
+    _warm_forms,
+    _warm_scene_clipping_3d,
+    _warm_cells,
     _warm_clipping_2d,
     _warm_scenes,
-    _warm_clearances,
     _warm_collision,
-    _warm_hits,
-    _warm_forms,
-    _warm_overlay_rest,
-    _warm_cells,
 )
-"""Parts of the work; a kernel that several need is compiled by the first, or in several processes.
-
-*order*: long ones first, those last that need the longest kernel of all (poses of meshes), which is stored when few
-processes reach them; many begin with them. Seconds of CPU, each alone with an empty cache: 29, 36, 28, 25, 24, 24, 23,
-23, 23, 20, 18, 17, 37, 38, 35, 15, 16, 6, 4.
-"""
-SHARES = (14, 16, 12, 5, 6, 7, 5, 8, 4, 2, 2, 3, 3, 2, 2, 2, 1, 4, 2)
+"""Parts of the work, in the best order tried for 4 to 32 processes: the two longest kernels (poses of meshes, overlay)
+begin, what needs them comes late. What several need is compiled by the first, the others wait (cold_start.py)."""
+SHARES = (15, 12, 6, 7, 2, 12, 3, 1, 4, 6, 3, 10, 6, 2, 7, 1, 1, 1, 1)
 """Duration of each of `STEPS`, in the order of `RELATED`, in per cent."""
-RELATED = ((1, 16, 14, 12, 5, 13, 8), (0, 17), (2, 7, 11, 3, 10, 15), (4, 6, 9, 18))
+RELATED = ((0, 13, 18, 17, 3, 10, 6), (5, 14, 16, 4, 2, 7), (11, 12, 8, 15), (1, 9))
 """Indices of steps that compile much the same, long ones first. One of few processes calls them, since what two need
 both compile; of more than there are such lists each calls the next step."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)

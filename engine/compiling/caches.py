@@ -25,7 +25,15 @@ from numba.core.types.abstract import _type_reconstructor  # type: ignore[attr-d
 from numba.core.typing import signature
 
 from engine.compiling import require
-from engine.compiling.kernel_cache import COMPLETE, cache_folder, read_cached, warn_of_compiling, write_cached
+from engine.compiling.kernel_cache import (
+    COMPLETE,
+    cache_folder,
+    end_turn,
+    read_cached,
+    wait_for_turn,
+    warn_of_compiling,
+    write_cached,
+)
 from engine.compiling.sources import PREFIX, as_imported, matches_its_source, plain_name, source_digest
 
 require(
@@ -99,9 +107,11 @@ class KernelCache(NullCache):  # type: ignore[misc]
         numba first imports everything that it can compile, a third of a second; compiling does that by itself.
         """
         rtsys.initialize(target_context)
-        for cpu in cpus() if source_digest(self._function.__module__) else ():
-            if content := read_cached(self._name(kinds, cpu)):
-                return self._rebuilt(kinds, target_context, *_Unpickler(io.BytesIO(content)).load())
+        names = [self._name(kinds, cpu) for cpu in cpus()] if source_digest(self._function.__module__) else []
+        for content in filter(None, map(read_cached, names)):
+            return self._rebuilt(kinds, target_context, *_Unpickler(io.BytesIO(content)).load())
+        if names and wait_for_turn(names[0]) and (late := read_cached(names[0])):
+            return self._rebuilt(kinds, target_context, *_Unpickler(io.BytesIO(late)).load())
         warn_of_compiling(self._function.__module__)
         return None
 
@@ -161,6 +171,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
             name, code, result = made.fndesc.mangled_name, made.library._get_compiled_object(), made.fndesc.restype
             _Pickler(content := io.BytesIO()).dump((name, code, result, constants, made.reload_init))
             write_cached(self._name(kinds, cpus()[0]), content.getvalue())
+        end_turn()
 
 
 def _fields(kinds: Any) -> Iterator[Any]:

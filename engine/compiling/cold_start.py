@@ -14,7 +14,7 @@ from pathlib import Path
 from numba import config as numba_config
 
 from engine.compiling.jit import completion_markers
-from engine.compiling.kernel_cache import cache_folder, seed
+from engine.compiling.kernel_cache import cache_folder, seed, take_turns
 from engine.compiling.sources import matches_its_source, source_digest
 
 try:
@@ -33,7 +33,8 @@ def end_with_parent(process):
     os._exit(1)
 
 threading.Thread(target=end_with_parent, args=[int(sys.argv[1])], daemon=True).start()
-sys.path[:] = sys.argv[3:]
+sys.path[:] = sys.argv[5:]
+importlib.import_module(sys.argv[3]).take_turns(sys.argv[4])
 work = importlib.import_module(sys.argv[2]).STEPS
 while steps := os.read(0, len(work)):
     for step in steps.rstrip(bytes([255])):
@@ -79,7 +80,7 @@ def fill_cache(
         own.mkdir(mode=0o755, parents=True, exist_ok=True)
         with _locked(own / "lock"):
             if not is_full(module):
-                done = _run(module, [part for part in parts if part], shares, processes, progress)
+                done = _run(module, [part for part in parts if part], shares, processes, own / "turns", progress)
                 if len(done) == len(shares):
                     note_full(module)
                 return done
@@ -123,10 +124,11 @@ def _run(
     parts: Sequence[Sequence[int]],
     shares: Sequence[int],
     processes: int,
+    turns: Path,
     progress: Callable[[int], object] | None,
 ) -> Sequence[int]:
     """Return the steps that succeeded; processes take lists of them, filled up with 255, from one pipe, and report each
-    to another."""
+    to another. What two need one of them compiles. turns: the file for that."""
     log.info("compiling all kernels, once for these sources: %d parts, %d processes", len(parts), processes)
     done: list[int] = []
     total = sum(shares[step] for part in parts for step in part)
@@ -136,7 +138,16 @@ def _run(
     os.close(left)
     try:
         try:
-            command = [sys.executable, "-c", _COMPILE, str(os.getpid()), module, *sys.path]
+            command = [
+                sys.executable,
+                "-c",
+                _COMPILE,
+                str(os.getpid()),
+                module,
+                take_turns.__module__,
+                str(turns),
+                *sys.path,
+            ]
             around, lost = {**os.environ, **PLAIN_ERRORS}, subprocess.DEVNULL
             for _ in range(min(processes, len(parts))):
                 running.append(subprocess.Popen(command, stdin=steps, stdout=said, stderr=lost, env=around))

@@ -34,6 +34,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+try:
+    import fcntl
+except ImportError:  # no such locks on this system: processes that start together compile the same
+    fcntl = None  # type: ignore[assignment]
+
 from engine.compiling.sources import PREFIX, reported, source_of, tools, warn_once
 
 log = logging.getLogger(__name__)
@@ -150,6 +155,34 @@ def read_cached(name: str) -> bytes | None:
                     "%s in %s is not used, nor others of which the same is true: %s", name, folder, error,
                 )  # fmt: skip
     return None
+
+
+def take_turns(file: str) -> None:
+    """From now on compile a kernel that another process is compiling only when it has ended. file: locked by parts, a
+    byte a kernel, by all processes that call this; locks end with their process."""
+    if fcntl is not None:
+        _turns.append(os.open(file, os.O_RDWR | os.O_CREAT, 0o644))
+
+
+def wait_for_turn(name: str) -> bool:
+    """Wait while another process that takes turns compiles the kernel of the file `name`; return whether one may have
+    written it meanwhile."""
+    for descriptor in _turns:
+        end_turn()
+        with suppress(OSError):  # this file system has no such locks: each compiles
+            fcntl.lockf(descriptor, fcntl.LOCK_EX, 1, int.from_bytes(hashlib.sha256(name.encode()).digest()[:6], "big"))
+    return bool(_turns)
+
+
+def end_turn() -> None:
+    """Let others compile, or load, the last kernel."""
+    for descriptor in _turns:
+        with suppress(OSError):
+            fcntl.lockf(descriptor, fcntl.LOCK_UN)
+
+
+_turns: list[int] = []
+"""The descriptor of the file of `take_turns`, once it was called."""
 
 
 def _unpacked(content: bytes) -> bytes:

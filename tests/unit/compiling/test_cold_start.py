@@ -40,8 +40,10 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def fill(place: Path, third: str = "say(2)", code: str = FILL, **more: str) -> subprocess.Popen[bytes]:
-    (place / "engine" / "work.py").write_text(WORK.format(place=str(place / "done"), third=third))
+def fill(
+    place: Path, third: str = "say(2)", code: str = FILL, work: str = WORK, **more: str
+) -> subprocess.Popen[bytes]:
+    (place / "engine" / "work.py").write_text(work.format(place=str(place / "done"), third=third))
     variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache"), "ENGINE_CACHE_SEED": "", **more}
     command = [sys.executable, "-X", "dev", "-c", code]  # says of every file that is left open
     return subprocess.Popen(command, env={**os.environ, **variables}, cwd=place, stderr=subprocess.PIPE)
@@ -105,6 +107,38 @@ def test_a_step_that_fails_is_tried_again(place: Path) -> None:
     assert steps_done(place) == ["0", "1"]
     assert end(fill(place, "1 / 0")) == (0, b"")
     assert steps_done(place) == ["0", "0", "1", "1"]
+
+
+TURNS = """
+import os, pathlib, time
+import numpy as np
+from numba.core import event
+from engine.compiling.jit import kernel
+PLACE = pathlib.Path({place!r})
+
+@kernel
+def total(rows):
+    total = 0.0
+    for row in rows:
+        total += row[0]
+    return total
+
+def both(step):
+    (PLACE / f"ready-{{step}}").touch()
+    while len(list(PLACE.glob("ready-*"))) < 2:
+        time.sleep(0.001)
+    with event.install_recorder("numba:compile") as seen:
+        assert total(np.ones((8, 2))) == 8.0
+    (PLACE / f"{{len(seen.buffer)}}-{{step}}").touch()
+
+STEPS = [lambda: both(0), lambda: both(1)]
+"""
+
+
+def test_a_kernel_that_two_processes_need_is_compiled_by_one(place: Path) -> None:
+    assert end(fill(place, code=FILL.replace("1, 1, 1", "1, 1"), work=TURNS)) == (0, b"")
+    counts = [name for name in steps_done(place) if name != "ready"]
+    assert (len(counts), counts.count("0")) == (2, 1)
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look processes up in")
