@@ -67,9 +67,8 @@ Exact = namedtuple("Exact", "heap terms state pose")
 
 @allocating
 def exact_scratch(pose: FloatArray) -> Exact:
-    """Allocate the scratch of lines under a pose (`find_hits`); none needs no room."""
-    room = _END if pose.shape[0] > 0 else 0
-    exact = Exact(np.empty(room, np.int64), np.empty((_N_TERMS, 3), np.int64), np.empty(_N_STATES, np.int64), pose)
+    """Allocate the scratch of lines under a pose (`find_hits`)."""
+    exact = Exact(np.empty(_END, np.int64), np.empty((_N_TERMS, 3), np.int64), np.empty(_N_STATES, np.int64), pose)
     exact.state[_IS_PLACED], exact.state[_LINE] = 0, -1
     return exact
 
@@ -149,7 +148,7 @@ def set_line(s: Exact, line: Line, item: int) -> None:
     way = -1 if line.turned == BACK else 1
     for k in range(3):
         place = k * STEP
-        store_double(s.heap, FROM + place, line.p[k])
+        store_double(s.heap, FROM + place, line.p[k] if line.is_placed else line.start[k][0])
         store_double(s.heap, VALUE, line.q[k])
         put_term(s, 0, VALUE, ONE, way)
         put_term(s, 1, FROM + place, ONE, -way)

@@ -1,8 +1,8 @@
 """From the contacts of one line to the rows of its hits, compiled.
 
 Contacts at one parameter are one hit. Their parameters are double-doubles, within 2^-67 of themselves: where that does
-not prove two apart they must be one point by their codes, or under a pose exact signs decide (exact_contacts.py); else
-the line stays OPEN.
+not prove two apart they must be one point by their codes, or exact signs decide (exact_contacts.py); where numbers are
+too long the line stays OPEN.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _compare(mesh: Mesh, line: Line, item: int, cuts: Crossings, i: int, j: int,
         (code | its) & Bit.ALONG == 0 and are_flush(mesh.elements, other, element)
     ):
         return 0
-    return compare_contacts(exact, mesh.elements, element, code, other, its, line, item) if line.is_placed else 2
+    return compare_contacts(exact, mesh.elements, element, code, other, its, line, item)
 
 
 @inline

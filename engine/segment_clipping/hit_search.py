@@ -132,7 +132,7 @@ def _search(mesh: Mesh, line: Line, item: int, keep: int, scratch: _Scratch, sto
             end = n
             if hit.code == IN_PLANE:
                 hit, end = _flat_hit(mesh, -1 - below, line, cuts, n)
-            if hit.code == Kind.DEGENERATE and line.is_placed:
+            if hit.code == Kind.DEGENERATE:
                 hit, end = _exact_hit(scratch.exact, mesh, -1 - below, line, item, keep, cuts, n)
             if hit.code == Kind.APART:
                 continue
@@ -172,7 +172,7 @@ def _flat_hit(mesh: Mesh, element: int, line: Line, cuts: Crossings, n: int) -> 
 def _exact_hit(
     exact: Exact, mesh: Mesh, element: int, line: Line, item: int, keep: int, cuts: Crossings, n: int
 ) -> tuple[Hit, int]:
-    """Return the contact of a line under a pose with a triangle that filters leave open, as `_flat_hit` does."""
+    """Return the contact of a line with a triangle that all before leave open, as `_flat_hit` does."""
     codes, t, is_sure = exact_codes(exact, mesh.elements, element, line, item), 0.0, True
     code, end_code = codes & ((1 << CODE_BITS) - 1), codes >> CODE_BITS
     if keep in (ANY, CODES):
@@ -292,7 +292,7 @@ def find_hits(
     | argument | content |
     |---|---|
     | lines, placed, blurs, is_ray | see `_line_of`; is_ray: they have no far end |
-    | pose (4 or 8, 3) | of the body, R and t; to CUT on a closed mesh also a vector (scenes/hits.py); none without |
+    | pose (4 or 8, 3) | of the body, R and t; for none the identity; CUT on closed meshes: a vector (scenes/hits.py) |
     | rims (k,) uint8 | by triangle, the sides that are rims, as bits |
     | keep | ALL, FIRST, ANY or NEAR; CUT under a pose |
     | room | capacity for the contacts of a line |

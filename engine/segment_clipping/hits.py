@@ -39,7 +39,7 @@ _BYTES: Final = 400
 """Memory counted for a hit, in its part and joined."""
 _NO_LINES: Final = read_only(np.zeros((0, 4, 3)))
 _NO_BLURS: Final = read_only(np.zeros(0))
-_NO_POSE: Final = read_only(np.zeros((0, 3)))
+_IDENTITY: Final = read_only(np.eye(4, 3))
 NO_FRAME: Final = read_only(np.zeros((0, 7)))
 
 
@@ -233,7 +233,7 @@ def plain_lines(lines: FloatArray, is_ray: bool) -> Lines:
         p, q = lines[item].tolist()
         return p, q if is_ray else [Fraction(y) - Fraction(x) for x, y in zip(p, q)]
 
-    return Lines(lines, _NO_LINES, _NO_BLURS, is_ray, _NO_POSE, exact)
+    return Lines(lines, _NO_LINES, _NO_BLURS, is_ray, _IDENTITY, exact)
 
 
 def search(

@@ -161,6 +161,16 @@ def test_lines_in_the_planes_of_faces_take_no_integers() -> None:
         assert accuracy.n_rational == 0
 
 
+def test_different_points_at_parameters_that_round_alike_take_no_rationals() -> None:
+    draw = np.random.default_rng(2)
+    grid = np.array([[x, y, draw.integers(0, 3)] for x in range(30) for y in range(30)], np.float64)
+    k = np.arange(870)[np.arange(870) % 30 < 29]
+    surface = engine.Surface(grid, np.concatenate([np.stack([k, k + 30, k + 31], 1), np.stack([k, k + 31, k + 1], 1)]))
+    lines = draw.integers(0, 29, (300, 2, 3)) * [1.0, 1.0, 0.05]
+    _, accuracy = engine.hits(lines, surface, report=True)
+    assert accuracy.n_rational == 0
+
+
 def images_under(pose: engine.Pose, surface: Any) -> list[Any]:
     """Return the corners of the triangles of a surface under a pose, as fractions."""
     rotation = [vector(row) for row in pose.rotation.tolist()]
