@@ -1,7 +1,7 @@
 """Segments through a scene: the kernels (segment_kernels.py), then the exact fallback for what they leave open.
 
-An unposed body, and one whose posed vertices are doubles, then clips a segment as `clip_segments`; other posed ones,
-CSG trees and prisms in exact arithmetic (profiles.py).
+A mesh then cuts a segment at its contacts (posed_contacts.py). Another unposed body, and one whose posed vertices are
+doubles, clips it as `clip_segments`; other posed ones, CSG trees and prisms in exact arithmetic (profiles.py).
 """
 
 from __future__ import annotations
@@ -276,13 +276,13 @@ def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budg
     segments that took rational arithmetic, all if it is unknown which; and of pieces whether they are longer than a
     point (`LoosePieces`)."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
-    if pose is not None and row_of(solid).hits is not None:
+    if row_of(solid).hits is not None:
         return cut_posed(segments, shape, pose, budget)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)
         pieces, _, n_rational = plan.cut(segments, shape, plan, budget, 1, None)
         return pieces, every[: n * bool(n_rational)], np.full(len(pieces.source), UNDECIDED)
-    if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
+    if pose is None and solid.dimension == 2 and solid.type in ("polygon", "triangle"):
         locator = None if n <= FEW else locator_of(solid).chosen(n, budget)
         pieces, rational = clip_chunk(segments, 0, n, shape, locator, budget)
         # contacts that round alike are one in kernels; an end of a segment may be none

@@ -25,7 +25,7 @@ from engine.scenes.table import frame_of
 from engine.segment_clipping import hits as on_one
 from engine.segment_clipping.hit_contacts import fill_normals
 from engine.segment_clipping.hit_search import ANY, FIRST
-from engine.segment_clipping.hits import Hits, Keep, Lines, Target, code_of_keep, find, plain_lines
+from engine.segment_clipping.hits import ASIDE, Hits, Keep, Lines, Target, code_of_keep, find, plain_lines
 from engine.solids.checks import as_point_groups
 from engine.solids.columns import Columns
 from engine.solids.pose import Pose
@@ -35,8 +35,6 @@ from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 _PAIRS: Final = 1 << 18
 """Pairs of lines and bodies that are looked at together."""
 _BYTES_OF_PAIR: Final = 40
-_ASIDE: Final = read_only(np.array([0.53, 0.46, 0.71]))
-"""A direction along which a ray leaves most bodies soon, across no plane that many of them have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -176,7 +174,7 @@ def lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:
         return start, [y - x for x, y in zip(start, to_body_frame(end, pose))]
 
     frame, n = frame_of(pose), len(rows)
-    placed, blurs, way = np.zeros((n + 1, 4, 3)), np.full(n + 1, np.inf), (pose.rotation @ _ASIDE).astype(np.float32)
+    placed, blurs, way = np.zeros((n + 1, 4, 3)), np.full(n + 1, np.inf), (pose.rotation @ ASIDE).astype(np.float32)
     if frame is not None:  # else: numbers out of range, which stay open
         entry_of(to_frame)(rows, lines.is_ray, way.astype(np.float64), frame, placed, blurs)
     # a ray aside: its vector, the same in the frame, the bound, and the tail

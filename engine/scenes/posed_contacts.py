@@ -1,4 +1,4 @@
-"""Segments that touch a posed mesh, run in its surface or pass so near that filters leave them open, cut at the
+"""Segments that touch a mesh of a scene, run in its surface or pass so near that filters leave them open, cut at the
 contacts that `find_hits` decides exactly.
 
 A start off the boundary is inside if a ray from it crosses an odd number of triangles. After one on the boundary the
@@ -29,10 +29,10 @@ _NO_NORMALS: Final = read_only(np.zeros((0, 3)))
 
 
 def cut_posed(
-    segments: FloatArray, solid: Polyhedron | Surface, pose: Pose, budget: Budget
+    segments: FloatArray, solid: Polyhedron | Surface, pose: Pose | None, budget: Budget
 ) -> tuple[Pieces, IntArray, IntArray]:
-    """Return the pieces of segments (n, 2, 3) within a posed mesh, sorted by source and t; the segments that took
-    rational arithmetic; and of pieces whether they are longer than a point (`LoosePieces`)."""
+    """Return the pieces of segments (n, 2, 3) within a mesh, sorted by source and t; the segments that took rational
+    arithmetic; and of pieces whether they are longer than a point (`LoosePieces`)."""
     n, mesh = len(segments), cast(Mesh, boundary_of(solid))
     target = Target(mesh, _NO_RIMS, _NO_NORMALS)
     lines, is_closed = lines_on(plain_lines(segments, False), np.arange(n), pose), isinstance(solid, Polyhedron)

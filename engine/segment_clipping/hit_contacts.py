@@ -235,7 +235,8 @@ def triangle_hit(elements: FloatArray, element: int, is_safe: bool, line: Line, 
         return _OPEN_HIT if line.is_placed else _NO_HIT if _is_beside(line, a, b, c) else _FLAT_HIT
     if _sign(v) * way < 0:
         return _NO_HIT
-    if _is_open(ab) or _is_open(bc) or _is_open(ca) or _is_open(v):
+    is_on = line.is_placed and _sign(ab) * _sign(bc) * _sign(ca) * _sign(v) == 0  # perturbed in the world, if turned
+    if is_on or _is_open(ab) or _is_open(bc) or _is_open(ca) or _is_open(v):
         return _OPEN_HIT
     wh, wl = dd_add(ab[0], ab[1], bc[0], bc[1])
     wh, wl = dd_add(wh, wl, ca[0], ca[1])

@@ -39,7 +39,9 @@ _BYTES: Final = 400
 """Memory counted for a hit, in its part and joined."""
 _NO_LINES: Final = read_only(np.zeros((0, 4, 3)))
 _NO_BLURS: Final = read_only(np.zeros(0))
-_IDENTITY: Final = read_only(np.eye(4, 3))
+ASIDE: Final = np.array([0.53, 0.46, 0.71], np.float32)
+"""A direction along which a ray leaves most bodies soon, across no plane that many of them have."""
+_IDENTITY: Final = read_only(np.vstack([np.eye(4, 3), ASIDE, ASIDE, np.zeros((2, 3))]))
 NO_FRAME: Final = read_only(np.zeros((0, 7)))
 
 

@@ -94,6 +94,21 @@ def test_pieces_are_those_of_rationals(seed: int) -> None:
         assert (are_long[differ] == 1).all()
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_pieces_without_a_pose(seed: int) -> None:
+    """Lattice lines: back from a start in a corner they passed its triangles on the wrong side."""
+    rng = np.random.default_rng([10, seed])
+    corners, faces = [(CORNERS, SIDES), (np.array(OCTAHEDRON) + 0.0, FACES)][seed % 2]
+    segments = rng.integers(-2, 4, (120, 2, 3)) / [1.0, 2.0][seed // 4]
+    segments = segments[(segments[:, 0] != segments[:, 1]).any(axis=1)]
+    for solid in (Polyhedron(corners, faces), Surface(corners, faces[:-1])):
+        found, left, are_long = cut_posed(segments, solid, None, UNLIMITED)
+        assert not len(left)
+        assert not (are_long == UNDECIDED).any()
+        for column, other in zip(found, clip_exactly(segments, np.arange(len(segments)), solid, None, UNLIMITED)):
+            np.testing.assert_array_equal(column, other)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_in_scenes(seed: int) -> None:
     rng = np.random.default_rng([8, seed])
