@@ -12,7 +12,6 @@ The line enters a triangle that turns left where the boundary passes from the le
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from typing import Any, Final
 
@@ -57,12 +56,9 @@ def _product(u: Any, v: Any, i: int, j: int) -> Triple:
 
 @inline
 def _ratio(top: Triple, bottom: Triple) -> tuple[float, float, bool]:
-    """Return top / bottom as a double-double, and whether its leading double is the proven nearest. Over a power of two
-    it may be halfway between two doubles."""
+    """Return top / bottom as a double-double, and whether its leading double is the proven nearest."""
     h, low = dd_div(1.0, 0.0, bottom[0], bottom[1])
     x, rest, is_sure = _quotient(top, (h, low, 1.01 * bottom[2] * abs(h) + 16.0 * U2))
-    if top[2] == 0.0 and bottom[2] == 0.0 and bottom[1] == 0.0 and abs(math.frexp(bottom[0])[0]) == 0.5:
-        x, rest, is_sure = top[0] / bottom[0] + 0.0, top[1] / bottom[0], top[0] == 0.0 or abs(top[0]) >= 2.0**-500
     return x, rest, is_sure and 2.0**-400 <= abs(bottom[0]) <= 2.0**400
 
 
