@@ -31,14 +31,7 @@ from engine.distance.distances import Distances, distances
 from engine.errors import EngineError, InvalidInputError
 from engine.files.layers import SEQUENCES, feature_in, write_geojson, write_layer
 from engine.files.octets import in_words
-from engine.files.solids import (
-    read_features,
-    read_rows,
-    read_solid,
-    read_solids,
-    write_mesh,
-    write_table,
-)
+from engine.files.solids import read_features, read_rows, read_solid, read_solids, write_mesh, write_table
 from engine.layers.feature_joins import join_features, locate_features, nearest_features
 from engine.layers.features import clip_features, dissolve_features, overlay_features, split_features
 from engine.layers.relate import PREDICATES

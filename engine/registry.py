@@ -192,7 +192,7 @@ ROWS: Final = (
                 {"powers": [0, 0], "coefficient": 1},
                 {"powers": [2, 0], "coefficient": -1},
                 {"powers": [0, 4], "coefficient": -1},
-            ],
+            ]
         },
         stored=("powers", "coefficients"),
         exact=rational_locate.in_implicit,

@@ -147,14 +147,7 @@ class TriangleMeasure:
         room, n_exact, (item, stop) = thread_room(), 0, span
         while True:  # bound: each turn answers a point, or doubles the room
             item, how, n = entry_of(find_nearest_on_mesh)(
-                self.row,
-                placed,
-                (item, stop),
-                goal,
-                answers.distance[shift:],
-                *rows,
-                room,
-                budget.flag,
+                self.row, placed, (item, stop), goal, answers.distance[shift:], *rows, room, budget.flag
             )
             budget.check()
             if item == stop:

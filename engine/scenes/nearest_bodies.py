@@ -22,16 +22,7 @@ import numpy as np
 from engine.compiling.jit import inline, kernel
 from engine.distance.point_formulas import nearest_on_ball
 from engine.distance.point_mesh import NOWHERE, OTHER, Features, mesh_at, write_feature
-from engine.distance.point_search import (
-    Goal,
-    PointRoom,
-    Spot,
-    enter_node,
-    limit_of,
-    measure_from,
-    next_child,
-    spot_of,
-)
+from engine.distance.point_search import Goal, PointRoom, Spot, enter_node, limit_of, measure_from, next_child, spot_of
 from engine.distance.traversal import FULL
 from engine.lanes.lanes import array_at
 from engine.scenes.near_boxes import N_BODIES, BodyTree, has_moved, name_in, tree_in

@@ -23,16 +23,7 @@ from typing import Final, NamedTuple
 from engine.compiling.jit import called, inline, kernel
 from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_sub, fma, two_diff, two_prod
 from engine.segment_clipping.on_boundary.crossing_values import Vector
-from engine.segment_clipping.pieces import (
-    OWN_END,
-    OWN_START,
-    End,
-    Pieces,
-    Triple,
-    point_of,
-    put_piece,
-    slack_of,
-)
+from engine.segment_clipping.pieces import OWN_END, OWN_START, End, Pieces, Triple, point_of, put_piece, slack_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 _LOST: Final = 2.0**-1060

@@ -12,14 +12,7 @@ import numpy as np
 
 from engine.compiling.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import INFINITESIMAL, Edges
-from engine.polygon_overlay.compiled.edge_tree import (
-    ANYWHERE,
-    BENT,
-    POLL,
-    RUN,
-    BoxTree,
-    heading,
-)
+from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, POLL, RUN, BoxTree, heading
 from engine.predicates.expansion import SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
