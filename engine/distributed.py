@@ -111,9 +111,7 @@ def clip_segments(
 ) -> clipping.SegmentPieces:
     """Clip segments on a region, see `engine.clip_segments`."""
     rows = as_point_groups(segments, 2, region.dimension, ("segments",))
-    function = partial(_about_rows, clipping.clip_segments)
-    parts_done = _in_order(_answers(client, function, (region,), (rows,), part, progress))
-    return _joined(parts_done) if parts_done else function((region,), rows)
+    return _joined(client, partial(_about_rows, clipping.clip_segments), region, rows, part, progress)
 
 
 def clip_segments_scene(
@@ -123,11 +121,7 @@ def clip_segments_scene(
     """Clip segments on the bodies of a scene, see `engine.Scene.clip_segments`; the scene is sent once to every worker
     and stays prepared there."""
     rows = as_point_groups(segments, 2, scene.solids[0].dimension if len(scene) else None, ("segments",))
-    function = partial(_about_solids, Scene.clip_segments, keep=keep)
-    parts_done = _in_order(_answers(client, function, (scene,), (rows,), part, progress))
-    if len(parts_done) < 2:
-        return parts_done[0][1] if parts_done else function((scene,), rows)
-    return np.concatenate([met for _, met in parts_done]) if keep == "any" else _joined(parts_done)
+    return _joined(client, partial(_about_solids, Scene.clip_segments, keep=keep), scene, rows, part, progress)
 
 
 def hits(
@@ -139,10 +133,7 @@ def hits(
     function = partial(_about_rows, one.hits, rays=rays, keep=keep)
     if isinstance(surface, Scene):
         function = partial(_about_solids, Scene.hits, rays=rays, keep=keep)
-    parts_done = _in_order(_answers(client, function, (surface,), (rows,), part, progress))
-    if len(parts_done) < 2:
-        return parts_done[0][1] if parts_done else function((surface,), rows)
-    return np.concatenate([met for _, met in parts_done]) if keep == "any" else _joined(parts_done)
+    return _joined(client, function, surface, rows, part, progress)
 
 
 def overlay_batch(
@@ -346,10 +337,14 @@ def _in_order(answers: Iterator[tuple[int, Any]]) -> list[tuple[int, Any]]:
     return sorted(answers, key=lambda each: each[0])
 
 
-def _joined(parts: list[tuple[int, Any]]) -> Any:
-    """Return the pieces of all parts as one object; parts: (start, pieces), `source` counting from the part's first
-    segment."""
+def _joined(client: Client, function: Function, solid: Any, rows: Any, part: int, progress: Progress | None) -> Any:
+    """Return the answers about all segments as one object, whose `source` counts from the first of all."""
+    parts = _in_order(_answers(client, function, (solid,), (rows,), part, progress))
+    if len(parts) < 2:
+        return parts[0][1] if parts else function((solid,), rows)
     kind = type(parts[0][1])
+    if kind is np.ndarray:
+        return np.concatenate([met for _, met in parts])
     source = np.concatenate([start + pieces.source for start, pieces in parts])
     names = [field.name for field in fields(kind)][1:]
     return kind(source, *(np.concatenate([getattr(pieces, name) for _, pieces in parts]) for name in names))

@@ -30,6 +30,7 @@ from engine.segment_clipping.profiles import ExactPiece, clip_exactly, exact_pie
 from engine.solids.base import Solid
 from engine.solids.checks import is_ready
 from engine.solids.pose import Pose
+from engine.solids.ragged import parts_of_runs, run_offsets
 from engine.solids.registry import row_of
 from engine.types import OPEN, UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray, read_only
 
@@ -134,7 +135,7 @@ def clip_first(
     more = Counts(len(left))
     some = clip_all(read_only(segments[left]), scene, more, budget, workers)
     counts.take(left, more)
-    first = np.flatnonzero(np.append(True, some.source[1:] != some.source[:-1])[: len(some)])
+    first = run_offsets(some.source)[:-1]
     some.ranks[:, 1] = some.ranks[:, 1] > some.ranks[:, 0]
     some.source[:] = left[some.source]
     joint = [np.concatenate([getattr(sure, field.name), getattr(some, field.name)[first]]) for field in fields(sure)]
@@ -247,12 +248,7 @@ def _cut(
     bodies = scene.names_of(bodies)
     order = np.argsort(bodies, kind="stable")
     owners, bodies = owners[order], bodies[order]
-    starts = np.flatnonzero(np.append(True, bodies[1:] != bodies[:-1])[: len(bodies)]).tolist()
-    groups = [
-        (first, min(first + _MOST_IN_GROUP, last))
-        for begin, last in zip(starts, [*starts[1:], len(bodies)])
-        for first in range(begin, last, _MOST_IN_GROUP)
-    ]
+    groups = parts_of_runs(bodies, _MOST_IN_GROUP)
     parts: dict[int, LoosePieces] = {}
 
     def task(first: int, last: int) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -39,6 +40,7 @@ from engine.solids.base import Solid
 from engine.solids.checks import check_finite
 from engine.solids.columns import Columns
 from engine.solids.pose import Pose
+from engine.solids.ragged import run_offsets
 from engine.solids.registry import BodyKind
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, read_only
 
@@ -199,8 +201,8 @@ def _turns(rows: IntArray, bounds: FloatArray, best: FloatArray, budget: Budget)
         budget.check()
         live = np.flatnonzero((ranks == rank) & ~(bounds > best[owners]))
         live = live[np.argsort(bodies[live], kind="stable")]
-        for group in np.split(live, np.flatnonzero(np.diff(bodies[live])) + 1) if len(live) else ():
-            yield owners[group], int(bodies[group[0]])
+        for begin, end in pairwise(run_offsets(bodies[live]).tolist()):
+            yield owners[live[begin:end]], int(bodies[live[begin]])
 
 
 def _name_late(nearest: Nearest, scene: Placements, still: _Rows, moved: _Rows) -> None:

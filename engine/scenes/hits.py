@@ -29,6 +29,7 @@ from engine.segment_clipping.hits import ASIDE, Hits, Keep, Lines, Target, code_
 from engine.solids.checks import as_point_groups
 from engine.solids.columns import Columns
 from engine.solids.pose import Pose
+from engine.solids.ragged import run_offsets
 from engine.solids.registry import refused, row_of
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 
@@ -157,7 +158,7 @@ def _near(lines: Lines, scene: Placements, budget: Budget) -> Iterator[tuple[Int
         near = pairs[: n[1]]
         near[:, 1] = scene.names_of(near[:, 1])
         order = np.argsort(near[:, 1], kind="stable")
-        yield near, np.split(order, np.flatnonzero(np.diff(near[order, 1])) + 1) if len(near) else []
+        yield near, np.split(order, run_offsets(near[order, 1])[1:-1]) if len(near) else []
         budget.take(-_BYTES_OF_PAIR * room)
 
 
@@ -226,7 +227,7 @@ def _merged(parts: list[Hits], bodies: list[IntArray], starts: dict[int, Any], k
         ranked = sorted(order.tolist(), key=lambda row: (source[row], t[row], exact.get(row, 0), body[row]))
         order = np.array(ranked, np.int64)
     if keep == FIRST:
-        order = order[np.append(True, source[order][1:] != source[order][:-1])[: len(order)]]
+        order = order[run_offsets(source[order])[:-1]]
     return SceneHits(source[order], body[order], *(column[order] for column in others))
 
 

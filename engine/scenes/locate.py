@@ -29,7 +29,7 @@ from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.placements import Placements
 from engine.solids.checks import check_finite
 from engine.solids.mesh import Polyhedron
-from engine.solids.ragged import Ragged
+from engine.solids.ragged import Ragged, parts_of_runs
 from engine.solids.registry import BodyKind, row_of
 from engine.types import UNDECIDED, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
@@ -261,17 +261,8 @@ def _locate_exactly(
         budget.check()
         locations[order] = again
         order = order[again == UNDECIDED]
-    ends = np.flatnonzero(np.append(bodies[order][1:] != bodies[order][:-1], True)) + 1 if len(order) else order
-    groups = [
-        (begin, min(begin + _MOST_IN_GROUP, end))
-        for first, end in zip([0, *ends.tolist()], ends.tolist())
-        for begin in range(first, end, _MOST_IN_GROUP)
-    ]
-    counts, locators = [], []
-    for (
-        begin,
-        end,
-    ) in groups:  # order: the choice depends on what a solid was asked before, so it is not left to threads
+    groups, counts, locators = parts_of_runs(bodies[order], _MOST_IN_GROUP), [], []
+    for begin, end in groups:  # order: the choice depends on what a solid was asked before: it is not left to threads
         budget.check()
         locators.append(scene.locator(int(bodies[order[begin]])).chosen(end - begin, budget))
 

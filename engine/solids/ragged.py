@@ -79,11 +79,22 @@ def summed(sizes: Sequence[int] | IntArray | BoolArray) -> IntArray:
     return read_only(offsets)
 
 
+def run_offsets(keys: IntArray) -> IntArray:
+    """Return offsets (n_runs + 1,) of the runs of equal numbers of an array (n,)."""
+    return np.append(np.flatnonzero(np.append(True, keys[1:] != keys[:-1])[: len(keys)]), len(keys))
+
+
+def parts_of_runs(keys: IntArray, most: int) -> list[tuple[int, int]]:
+    """Return (first, last) of parts of at most so many equal numbers of an array."""
+    runs = pairwise(run_offsets(keys).tolist())
+    return [(first, min(first + most, last)) for begin, last in runs for first in range(begin, last, most)]
+
+
 def ascending(numbers: IntArray) -> IntArray:
     """Return each integer of an array once, in order; np.unique, by a hash table from numpy 2.3 on, takes up to 70
     times as long for millions."""
     flat = np.sort(numbers, axis=None)
-    distinct: IntArray = flat[np.append(np.True_, flat[1:] != flat[:-1])[: len(flat)]]
+    distinct: IntArray = flat[run_offsets(flat)[:-1]]
     return distinct
 
 
