@@ -1,4 +1,4 @@
-"""The numbers that tell how a line and a triangle under a pose meet, exact, in multi-digit integers (digits.py).
+"""The numbers that tell how a line and a triangle, posed or not, meet: exact, in multi-digit integers (digits.py).
 
 A pose x -> R x + t of doubles has R^-1 = C / w with the cofactors C of R, transposed, and w = det R > 0. With a line
 from p along u in the world,

@@ -8,11 +8,12 @@ the line meets a triangle with w != 0 where no two of ab, bc, ca differ in sign:
 bc / w, ca / w, ab / w. The determinants are double-doubles with the bounds of crossing_values.py. Where that leaves a
 sign or the rounding of a quotient open, the vector products are expansions, and at last the determinant itself. A
 vector product from a compressed expansion is within 8 u^2 of itself, which `dot` takes for the 16 u^2 m of `minor`.
+What is open still is decided in exact_lines.py, a triangle without area in exact_hits.py.
 
 Under a pose p and e are double-doubles, off by `blur` at most: each of the six products of a determinant, with factors
 below M, moves by 3 blur (M + blur)^2, all of them by less than `_BLUR` blur (M + blur)^2. A sign that this leaves open
-is decided in exact_lines.py, a triangle without area in exact_hits.py. Signs that are proven leave t
-open by as much as v and w are, relative to w: far ends and earlier hits are compared with that in mind.
+is open without expansions. Signs that are proven leave t open by as much as v and w are, relative to w: far ends and
+earlier hits are compared with that in mind.
 
 Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997. Changed: all is exact.
 """

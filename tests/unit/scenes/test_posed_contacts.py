@@ -109,6 +109,20 @@ def test_pieces_without_a_pose(seed: int) -> None:
             np.testing.assert_array_equal(column, other)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_corner_at_an_end_is_a_point(seed: int) -> None:
+    """One in nine was ranked as a piece longer than that, where no pose is."""
+    rng = np.random.default_rng([11, seed])
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    solid: Any = Polyhedron(CORNERS @ Pose.from_quaternion(rng.normal(size=4)).rotation, quads)
+    corners = np.tile(solid.vertices, (2, 1))
+    away = corners + rng.normal(size=corners.shape)
+    segments = np.concatenate([np.stack([away, corners], axis=1), np.stack([corners, away], axis=1)])
+    found, report = Scene([solid]).clip_segments(segments, report=True)
+    assert report.n_rational == 0
+    assert_exact(found, segments, expected_pieces(segments, [solid], [None]))
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_in_scenes(seed: int) -> None:
     rng = np.random.default_rng([8, seed])
