@@ -318,7 +318,8 @@ class Answers:
         relations = self.relations[start:stop]
         is_left = relations == UNSETTLED
         if self.witnesses is not None:
-            is_left |= (relations != DISJOINT) & np.array([w is None for w in self.witnesses[start:stop]], np.bool_)
+            rows = np.flatnonzero(~is_left & (relations != DISJOINT))
+            is_left[rows] = [self.witnesses[item] is None for item in (start + rows).tolist()]
         left: IntArray = start + np.flatnonzero(is_left)
         return left
 

@@ -246,7 +246,7 @@ def _select_pairs(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: 
     if answers.boolean:
         answers.relations[meet] = Relation.TOUCHING
     rows = np.flatnonzero(meet if near is None else near != np.inf)
-    named = None if answers.witnesses is None else tuple(answers.witnesses[item] for item in rows.tolist())
+    named = None if answers.witnesses is None else tuple(map(answers.witnesses.__getitem__, rows.tolist()))
     details = None if answers.details is None else answers.details[rows]
     if details is not None:
         details[~_have_interiors(bodies, pairs[rows], answers.budget)] = NO_DETAIL
@@ -261,7 +261,7 @@ def _concatenate(parts: list[ScenePairs]) -> ScenePairs:
     order = np.argsort(joined[0] * (int(joined[1].max(initial=0)) + 1) + joined[1], kind="stable")  # merges blocks
     ordered: list[Any] = [None if column is None else column[order] for column in joined]
     named = [witness for part in parts for witness in part.witnesses or ()]
-    witnesses = None if parts[0].witnesses is None else tuple(named[item] for item in order.tolist())
+    witnesses = None if parts[0].witnesses is None else tuple(map(named.__getitem__, order.tolist()))
     first, second, relation, detail, distance = ordered
     return ScenePairs(first, second, relation, witnesses, detail, distance)
 
