@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.collision.batches import SceneBodies
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import Answers, PlacedPair
+from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, details_where_proven
 from engine.collision.collide_poses import batch_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.simple.closed_forms import FORMS
@@ -80,7 +80,7 @@ def settle_pairs(
 def _keys_of(bodies: SceneBodies, pairs: IntArray, answers: Answers) -> IntArray:
     """Return a number for each pair (n, 2), equal for pairs that one kernel call may relate: of the same two solids,
     each posed in both or in neither; one of its own for a pair under equal poses, and where no kernel helps."""
-    if bodies.dimension == 2 or answers.details is not None:
+    if bodies.dimension == 2:
         return np.arange(len(pairs))
     (i, j), n, turns = pairs.T, len(bodies.distinct), bodies.rotations[1:]
     is_moved = _are_any(turns != np.eye(3)) | _are_any(bodies.translations[1:] != 0.0)
@@ -109,13 +109,17 @@ def _relate_group(bodies: SceneBodies, pairs: IntArray, items: IntArray, answers
         is_posed = bool((turns[0] != np.eye(bodies.dimension)).any() or moves[0].any())
         posed.append(PoseArrays(turns, moves, is_posed))
     named: list[Any] | None = None if answers.witnesses is None else [None] * len(items)
-    some = Answers(answers.budget, answers.boolean, np.full(len(items), UNSETTLED, np.int8), named, None)
+    relations = np.full(len(items), UNSETTLED, np.int8)
+    details = None if answers.details is None else np.full(len(items), NO_DETAIL, np.int8)
+    some = Answers(answers.budget, answers.boolean, relations, named, details)
     fill = batch_of(bodies.solids[one[0]], bodies.solids[one[1]], posed[1], some, posed[0])
     if fill is None:
         return items
     fill(0, len(items))
     left = some.left()
-    answers.relations[items] = some.relations
+    answers.relations[items] = relations
+    if answers.details is not None:
+        answers.details[items] = details_where_proven(relations)
     if answers.witnesses is not None and named is not None:
         for item, witness in zip(items.tolist(), named):
             answers.witnesses[item] = witness
