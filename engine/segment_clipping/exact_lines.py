@@ -34,7 +34,7 @@ from typing import Final
 import numpy as np
 
 from engine.compiling.jit import allocating, called, inline
-from engine.lanes.faces import AXES_BEFORE
+from engine.lanes.faces import AXES_BEFORE, longest_axis
 from engine.predicates.digits import BITS, SLOT, leading, nearest_quotient, negate, sign_of, store_double, sum_products
 from engine.predicates.error_free import dd_div
 from engine.segment_clipping.hit_contacts import BACK, Line
@@ -158,8 +158,10 @@ def set_line(s: Exact, line: Line, item: int) -> None:
     _put_turned(s, _COFACTORS, ALONG, WAY)
     _put_cross(s, ALONG, _SEEN_FROM, SIDEWAYS)
     _put_turned(s, TURN, SIDEWAYS, _MOMENT)
-    longest = 0
-    for k in range(1, 3):
+    longest = longest_axis((line.way[0][0], line.way[1][0], line.way[2][0]))
+    for k in range(
+        3 if line.blur > 0.0 else 0
+    ):  # else signs in double-doubles count too: perturbed along the same axis
         here, best = WAY + k * STEP, WAY + longest * STEP
         put_term(s, 0, here, ONE, sign_of(s.heap, here))
         put_term(s, 1, best, ONE, -sign_of(s.heap, best))

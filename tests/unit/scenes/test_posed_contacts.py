@@ -109,6 +109,20 @@ def test_pieces_without_a_pose(seed: int) -> None:
             np.testing.assert_array_equal(column, other)
 
 
+@pytest.mark.parametrize("off", [1e-30, 2.0**-53, 3e-16])
+def test_segments_as_long_along_two_axes_but_for_what_rounds(off: float) -> None:
+    """Signs in doubles and in integers are perturbed along the same axis: the rounded vector's longest."""
+    starts = np.array([[x, y, off] for x in (0.0, 1.0) for y in (0.0, 0.5, 1.0)])
+    ways = np.array([[x, y, z] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) for z in (-1.0, 1.0)])
+    ends = np.round(starts)[:, None] + ways
+    segments = np.stack([np.broadcast_to(starts[:, None], ends.shape), ends], axis=2).reshape(-1, 2, 3)
+    solid = Polyhedron(CORNERS, SIDES)
+    found, left, _ = cut_posed(segments, solid, None, UNLIMITED)
+    assert not len(left)
+    for column, other in zip(found, clip_exactly(segments, np.arange(len(segments)), solid, None, UNLIMITED)):
+        np.testing.assert_array_equal(column, other)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_corner_at_an_end_is_a_point(seed: int) -> None:
     """One in nine was ranked as a piece longer than that, where no pose is."""
