@@ -31,7 +31,7 @@ from engine.solids.primitives import Triangle
 from engine.warmup import RELATED, STEPS, regions_of, warm
 
 Options = argparse.Namespace
-GROUPS = (RELATED[0] + RELATED[2], RELATED[3] + RELATED[1])
+GROUPS = (RELATED[0] + RELATED[3], RELATED[1] + RELATED[2])
 """Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
 decides symbols and inlining. What both compile is that of the first."""
 
