@@ -402,8 +402,8 @@ begin, what needs them comes late. What several need is compiled by the first, t
 SHARES = (15, 12, 6, 7, 2, 12, 3, 1, 4, 6, 3, 10, 6, 2, 7, 1, 1, 1, 1)
 """Duration of each of `STEPS`, in the order of `RELATED`, in per cent."""
 RELATED = ((0, 13, 18, 17, 3, 10, 6), (1, 9), (5, 14, 16, 4, 2, 7), (11, 12, 8, 15))
-"""Indices of steps that compile much the same, long ones first. One of few processes calls them, since what two need
-both compile; of more than there are such lists each calls the next step."""
+"""Indices of steps that compile much the same, long ones first. One of few processes calls them, since inner functions
+that two need both compile; of more than there are such lists each calls the next step."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)
 _COLLIDING, _OVERLAYING = (_warm_collision, _warm_forms), (_warm_overlay, _warm_overlay_rest)
 _IN_SCENES = (_warm_scenes, _warm_flat_bodies)

@@ -159,9 +159,8 @@ def set_line(s: Exact, line: Line, item: int) -> None:
     _put_cross(s, ALONG, _SEEN_FROM, SIDEWAYS)
     _put_turned(s, TURN, SIDEWAYS, _MOMENT)
     longest = longest_axis((line.way[0][0], line.way[1][0], line.way[2][0]))
-    for k in range(
-        3 if line.blur > 0.0 else 0
-    ):  # else signs in double-doubles count too: perturbed along the same axis
+    # A line without blur has signs in double-doubles as well, which are perturbed along the axis of the rounded vector.
+    for k in range(3 if line.blur > 0.0 else 0):
         here, best = WAY + k * STEP, WAY + longest * STEP
         put_term(s, 0, here, ONE, sign_of(s.heap, here))
         put_term(s, 1, best, ONE, -sign_of(s.heap, best))
