@@ -108,10 +108,11 @@ class KernelCache(NullCache):  # type: ignore[misc]
         """
         rtsys.initialize(target_context)
         names = [self._name(kinds, cpu) for cpu in cpus()] if source_digest(self._function.__module__) else []
-        for content in filter(None, map(read_cached, names)):
+        content = next(filter(None, map(read_cached, names)), None)
+        if content is None and names and wait_for_turn(names[0]):
+            content = read_cached(names[0])
+        if content:
             return self._rebuilt(kinds, target_context, *_Unpickler(io.BytesIO(content)).load())
-        if names and wait_for_turn(names[0]) and (late := read_cached(names[0])):
-            return self._rebuilt(kinds, target_context, *_Unpickler(io.BytesIO(late)).load())
         warn_of_compiling(self._function.__module__)
         return None
 

@@ -8,19 +8,14 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from numba import config as numba_config
 
 from engine.compiling.jit import completion_markers
-from engine.compiling.kernel_cache import cache_folder, seed, take_turns
+from engine.compiling.kernel_cache import cache_folder, locked, seed, take_turns
 from engine.compiling.sources import matches_its_source, source_digest
-
-try:
-    import fcntl
-except ImportError:  # no such locks on this system: processes that start together compile the same
-    fcntl = None  # type: ignore[assignment]
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +73,7 @@ def fill_cache(
     with contextlib.suppress(OSError):
         own = folder / digest
         own.mkdir(mode=0o755, parents=True, exist_ok=True)
-        with _locked(own / "lock"):
+        with locked(own / "lock"):
             if not is_full(module):
                 done = _run(module, [part for part in parts if part], shares, processes, own / "turns", progress)
                 if len(done) == len(shares):
@@ -111,14 +106,6 @@ def has_all(folder: Path, module: str) -> bool:
     return digest is not None and any((folder / digest / marker).exists() for marker in completion_markers())
 
 
-@contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    with path.open("w") as file:
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX)  # given back when the process ends, however it ends
-        yield
-
-
 def _run(
     module: str,
     parts: Sequence[Sequence[int]],
@@ -138,16 +125,8 @@ def _run(
     os.close(left)
     try:
         try:
-            command = [
-                sys.executable,
-                "-c",
-                _COMPILE,
-                str(os.getpid()),
-                module,
-                take_turns.__module__,
-                str(turns),
-                *sys.path,
-            ]
+            names = module, take_turns.__module__, str(turns)
+            command = [sys.executable, "-c", _COMPILE, str(os.getpid()), *names, *sys.path]
             around, lost = {**os.environ, **PLAIN_ERRORS}, subprocess.DEVNULL
             for _ in range(min(processes, len(parts))):
                 running.append(subprocess.Popen(command, stdin=steps, stdout=said, stderr=lost, env=around))

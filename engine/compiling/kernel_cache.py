@@ -30,16 +30,16 @@ import tempfile
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+from engine.compiling.sources import PREFIX, reported, source_of, tools, warn_once
 
 try:
     import fcntl
 except ImportError:  # no such locks on this system: processes that start together compile the same
     fcntl = None  # type: ignore[assignment]
-
-from engine.compiling.sources import PREFIX, reported, source_of, tools, warn_once
 
 log = logging.getLogger(__name__)
 
@@ -155,6 +155,15 @@ def read_cached(name: str) -> bytes | None:
                     "%s in %s is not used, nor others of which the same is true: %s", name, folder, error,
                 )  # fmt: skip
     return None
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold the lock of a file; wait while another process does."""
+    with path.open("w") as file:
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX)  # given back when the process ends, however it ends
+        yield
 
 
 def take_turns(file: str) -> None:
