@@ -42,10 +42,11 @@ def makespan(ranges: Ranges, run: Callable[[int, int], float], lock_seconds: flo
 
 
 class Spent:
-    """CPU seconds of one call within its shared ranges, and the makespan of these on virtual threads."""
+    """CPU seconds of one call in what it shares, with those that simulating takes, and the makespan of its ranges on
+    virtual threads."""
 
     def __init__(self) -> None:
-        self.in_ranges = self.makespan = 0.0
+        self.shared = self.makespan = 0.0
 
     def share(
         self, task: Callable[[int, int], object], ranges: Ranges, budget: Budget, progress: Progress | None
@@ -60,10 +61,11 @@ class Spent:
             budget.check()
             if progress is not None:
                 progress(stop - first)
-            self.in_ranges += seconds
             return seconds
 
+        begin = time.thread_time()
         self.makespan += makespan(ranges, run)
+        self.shared += time.thread_time() - begin
 
 
 @contextmanager
@@ -87,7 +89,7 @@ def predict(question: Callable[[int | None], Any], counts: list[int], rounds: in
             with simulated() as spent:
                 before = time.thread_time()
                 question(count)
-                serial = time.thread_time() - before - spent.in_ranges
+                serial = time.thread_time() - before - spent.shared
             least[count] = min(least.get(count, (float("inf"), 0.0)), (serial + spent.makespan, serial))
     speed_up = {str(count): one / seconds for count, (seconds, _) in least.items()}
     return {"seconds": one, "serial": least[counts[-1]][1] / one, "speed_up": speed_up}
