@@ -33,6 +33,7 @@ from engine.lanes.cells import ROWS, groups_of, set_entry, set_nothing
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import corners_of
 from engine.running.budget import Budget
+from engine.running.parallel import share
 from engine.solids.mesh import Polyhedron
 from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 
@@ -46,7 +47,8 @@ _FEWEST_GROUPS: Final = 32
 MOST_FACES: Final = 1 << 14
 """Number of faces up to which scenes build `Sides`."""
 _PAYS_FROM, _PAYS_PER_FACE = 1 << 10, 2
-_BLOCK: Final = 4096
+_GROUP_SECONDS, _RAY_SECONDS = 1.5e-6, 1e-6
+"""Time to fill a group, and for each ray."""
 
 
 class Cells(NamedTuple):
@@ -82,11 +84,7 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Build the cells of `solid`. Raises: DeadlineExceededError, CancelledError."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
-    counts = count_triangles(mesh, budget)
-    ends = np.cumsum(counts)
-    lists = np.empty(int(ends[-1]), np.int32)
-    list_triangles(mesh, ends - counts, lists, True, budget.flag)
-    budget.check()
+    lists, counts, ends = list_triangles(mesh, count_triangles(mesh, budget.flag), budget.flag)
     sides = _sides_by_rays(tree, lattice, counts, False, budget)
     longest = LANES * max(_FEWEST_GROUPS, cost_in_tree(solid) / _GROUP)
     leaves = np.flatnonzero((counts > 0) & (sides != _UNKNOWN) & (counts <= longest))
@@ -95,8 +93,13 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     codes = np.full(len(counts), MIXED_CELL, np.int32)
     codes[leaves] = 2 * starts + (sides[leaves] > 0)
     groups = groups_of(int(last_groups[-1]) if len(leaves) else 0)
-    fill_groups(mesh, leaves, starts, (ends - counts)[leaves], ends[leaves], lists, groups, budget.flag)
-    budget.check()
+    firsts, ends = (ends - counts)[leaves], ends[leaves]
+
+    def fill(first: int, last: int) -> None:
+        some = slice(first, last)
+        fill_groups(mesh, leaves[some], starts[some], firsts[some], ends[some], lists, groups, budget.flag)
+
+    share(fill, len(leaves), _GROUP_SECONDS * len(groups) / max(1, len(leaves)))
     return Cells(lattice, _statuses(sides, counts), codes, groups)
 
 
@@ -117,7 +120,7 @@ def sides_if_profitable(solid: Polyhedron, n_points: int, budget: Budget) -> Sid
 def build_sides(solid: Polyhedron, budget: Budget) -> Sides:
     """Build the `Sides` of a polyhedron. Raises: DeadlineExceededError, CancelledError."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
-    counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget)
+    counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget.flag).sum(axis=0)
     statuses = _statuses(_sides_by_rays(tree, lattice, counts, True, budget), counts)
     return Sides(np.array([*lattice.low, *lattice.scale]), (statuses.ctypes.data, *lattice.n), statuses)
 
@@ -152,16 +155,18 @@ def _sides_by_rays(
     (nx, ny, _), labels = lattice.n, np.empty(len(counts), np.int64)
     label_empty_cells(counts, nx, ny, labels)
     queried = np.flatnonzero((labels == np.arange(len(labels))) & ((counts == 0) | (not only_empty)))
-    sides, no_blurs = np.zeros(len(counts), np.int8), np.zeros(_BLOCK)
-    for start in range(0, len(queried), _BLOCK):
-        cells = queried[start : start + _BLOCK]
+    sides = np.zeros(len(counts), np.int8)
+
+    def ask(first: int, last: int) -> None:
+        cells = queried[first:last]
         places = np.stack([cells % nx, cells // nx % ny, cells // (nx * ny)], axis=1)
         points, locations = np.array(lattice.low) + (places + PLACE) * lattice.size, np.empty(len(cells), np.int8)
         with np.errstate(all="ignore"):
-            locate_by_tree(read_only(points), no_blurs[: len(cells)], tree, locations, budget.flag)
-        budget.check()
+            locate_by_tree(read_only(points), np.zeros(len(cells)), tree, locations, budget.flag)
         is_in_cell = (((points - lattice.low) * lattice.scale).astype(np.int64) == places).all(axis=1)
         sides[cells] = np.where(is_in_cell & (np.abs(locations) == 1), locations, _UNKNOWN)
+
+    share(ask, len(queried), _RAY_SECONDS)
     return sides[labels]
 
 

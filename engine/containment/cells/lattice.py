@@ -34,6 +34,7 @@ from engine.compiling.jit import inline, kernel
 from engine.containment.prepared import TriangleTree, tree_of
 from engine.predicates.vectors import corners_of
 from engine.running.budget import Budget
+from engine.running.parallel import share
 from engine.solids.mesh import Polyhedron
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
@@ -139,6 +140,11 @@ _WANTED: Final = 4.0
 """Cells along an axis for each triangle along an edge of a cube with as many triangles."""
 _MOST_CELLS: Final = 160.0
 """Largest number of cells along an axis."""
+_IN_A_RANGE: Final = 1 << 17
+_MOST_RANGES: Final = 16
+"""Triangles of a range that a thread looks at, at least, and number of ranges: each has a row of counts."""
+_SECONDS: Final = 6e-8
+"""Time for each triangle."""
 _FEWEST_CELLS: Final = 12
 _MOST_ENTRIES: Final = 12.0
 _FEW_ENTRIES: Final = 1 << 16
@@ -196,11 +202,13 @@ def _span(a: float, b: float, c: float, low: float, scale: float, n: int) -> tup
 
 
 @kernel
-def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray) -> None:
-    """Count the triangles that may reach into each cell, by ends[cell] += 1; if is_fill, also list them, by
-    items[ends[cell]] = triangle before that. Stops if `flag` is set."""
+def _list_triangles(
+    mesh: Mesh, first: int, last: int, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray
+) -> None:
+    """Count those of triangles first .. last - 1 that may reach into each cell, by ends[cell] += 1; if is_fill, also
+    list them, by items[ends[cell]] = triangle before that. Stops if `flag` is set."""
     low, scale, (nx, ny, nz) = mesh.lattice.low, mesh.lattice.scale, mesh.lattice.n
-    for triangle in range(len(mesh.triangles)):
+    for triangle in range(first, last):
         if flag[0]:
             break
         a, b, c = corners_of(mesh.vertices, mesh.triangles, triangle)
@@ -240,7 +248,7 @@ def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
         some = tree.triangles[:: len(tree.triangles) // _SAMPLE + 1].copy()
         while True:  # bound: halved each turn
             lattice = _make_lattice(tree, most)
-            entries = count_triangles(Mesh(tree.vertices, some, lattice), budget).sum() / len(some)
+            entries = count_triangles(Mesh(tree.vertices, some, lattice), budget.flag).sum() / len(some)
             if entries <= _MOST_ENTRIES + _FEW_ENTRIES / len(tree.triangles) or max(lattice.n) <= _FEWEST_CELLS:
                 return lattice
             most = min(most, max(lattice.n)) / 2.0
@@ -248,13 +256,36 @@ def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
     return solid.prepared("lattice", find, budget.check)
 
 
-def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
-    """Return (n_cells,) int64: how many triangles may reach into each cell."""
-    nx, ny, nz = mesh.lattice.n
-    counts = np.zeros(nx * ny * nz, np.int64)
-    list_triangles(mesh, counts, np.empty(0, np.int32), False, budget.flag)
-    budget.check()
-    return counts
+def count_triangles(mesh: Mesh, flag: FlagArray) -> IntArray:
+    """Return (n_ranges, n_cells) int64: how many of each range of triangles may reach into each cell."""
+    return _in_ranges(mesh, None, np.empty(0, np.int32), flag)
+
+
+def list_triangles(mesh: Mesh, counts: IntArray, flag: FlagArray) -> tuple[Int32Array, IntArray, IntArray]:
+    """Return the triangles that may reach into each cell, ascending, cell by cell; the sizes (n_cells,) of these lists,
+    and their ends. counts: of `count_triangles`."""
+    sizes = counts.sum(axis=0)
+    ends = np.cumsum(sizes)
+    starts = np.cumsum(counts, axis=0)
+    starts += (ends - sizes) - counts
+    lists = np.empty(int(ends[-1]), np.int32)
+    _in_ranges(mesh, starts, lists, flag)
+    return lists, sizes, ends
+
+
+def _in_ranges(mesh: Mesh, starts: IntArray | None, lists: Int32Array, flag: FlagArray) -> IntArray:
+    """Call `_list_triangles` for ranges of triangles, each with a row of starts, or of new counts; return these."""
+    n = len(mesh.triangles)
+    n_ranges, (nx, ny, nz) = max(1, min(_MOST_RANGES, n // _IN_A_RANGE)), mesh.lattice.n
+    rows = np.zeros((n_ranges, nx * ny * nz), np.int64) if starts is None else starts
+
+    def look(first: int, last: int) -> None:
+        for part in range(first, last):
+            start, stop = n * part // n_ranges, n * (part + 1) // n_ranges
+            _list_triangles(mesh, start, stop, rows[part], lists, starts is not None, flag)
+
+    share(look, n_ranges, _SECONDS * n / n_ranges)
+    return rows
 
 
 def _make_lattice(tree: TriangleTree, most: float) -> Lattice:
