@@ -89,6 +89,7 @@ def workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
     yield "segments, scene of 1,000", len(long), lambda workers: scene.clip_segments(long, workers=workers)
     spread = draw.uniform(-15, 15, (n(1e6), 3))
     yield "points, scene of 1,000", len(spread), lambda workers: scene.locate(spread, workers=workers)
+    yield from _first_questions(items, seed)
     _, solids, poses = _bodies(seed, n(4e4))
     crowd = engine.Scene(solids, poses)
     yield "pairs, scene of 40,000", len(solids), lambda workers: crowd.collide(witnesses=True, workers=workers)
@@ -98,6 +99,28 @@ def workloads(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
     yield "overlay_batch, stars of 10", len(first), lambda workers: engine.overlay_batch(first, second, workers=workers)
     discs = _discs(n(2e4), seed)
     yield "union of circles", len(discs), lambda workers: engine.union_all(discs, workers=workers)
+
+
+def _first_questions(items: float, seed: int) -> Iterator[tuple[str, int, Question]]:
+    """Yield questions to a mesh of 1.3 million faces, or a sixteenth, for which nothing is prepared yet."""
+    fresh, small = (
+        engine.Polyhedron(mesh.vertices + np.array([move, 0, 0]), mesh.faces)
+        for mesh, move in ((bumpy_sphere("cores", seed, 8 if items >= 1 else 6), 0), (bumpy_sphere("cores", 9, 3), 1.6))
+    )
+    points = generator("cores/fresh", seed).uniform(-1, 1, (20_000, 2, 3))
+
+    def first(ask: Question) -> Question:
+        def question(workers: int | None) -> Any:
+            fresh.drop("tree", "mesh_body", "clipping_boundary")
+            return ask(workers)
+
+        return question
+
+    scene, n = lambda workers: engine.Scene([fresh]).locate(points[:, 0], workers=workers), fresh.n_faces
+    yield "fresh mesh: points", n, first(scene)
+    yield "fresh mesh: segments", n, first(lambda workers: engine.clip_segments(points, fresh, workers=workers))
+    still = np.eye(3)[None], np.zeros((1, 3))
+    yield "fresh mesh: pairs", n, first(lambda workers: engine.collide_poses(fresh, small, *still, workers=workers))
 
 
 def digest_of(answer: Any) -> str:

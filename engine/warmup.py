@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.bounding.trees import build_bvh
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.meshes.dual_traversal import SEEK_OVERLAP
@@ -176,8 +177,9 @@ def _locate(dimension: int) -> None:
 
 
 def _warm_cells() -> None:
-    """Locate so many points in a cube and in a ring of 300 edges that grids of cells are built."""
+    """Build grids of cells for a cube and a ring of 300 edges, and a tree as one of very many items is built."""
     many, cube = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3)), _cube()
+    build_bvh(np.concatenate([many, many], axis=1), many=_MANY)
     locate(many, cube)
     locate_scene(many, [cube])
     around = np.linspace(0, 2 * np.pi, 300, endpoint=False)

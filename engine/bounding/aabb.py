@@ -109,16 +109,17 @@ _ENLARGED: Final = 2.0**-20
 
 
 @allocating_kernel
-def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array) -> None:
-    """Fill discs (n_nodes, 8, 8) float32 of a tree: rows cx cy cz nx ny nz r t, one flat cylinder a lane around the
-    triangles below each child of an inner node. blocks (n_nodes, 9, 8): corners of the triangles at leaf nodes; child,
-    boxes: of the tree (`bvh.py`), in whose coordinates all is. Unused lanes get zeros; leaf nodes are not set."""
+def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array, first: int) -> None:
+    """Fill discs (n_nodes, 8, 8) float32 of whole subtrees: rows cx cy cz nx ny nz r t, one flat cylinder a lane around
+    the triangles below each child of an inner node. blocks (n_nodes, 9, 8): corners of the triangles at leaf nodes;
+    child, boxes: of the tree (`bvh.py`), in whose coordinates all is; first: number of the first of these nodes. Unused
+    lanes get zeros; leaf nodes are not set."""
     n_nodes = child.shape[0]
     parents = np.full(n_nodes, -1, np.int64)  # 8 times the parent, and the lane
     for node in range(n_nodes):
         for lane in range(LANES):
             if child[node, lane] >= 0:
-                parents[child[node, lane]] = LANES * node + lane
+                parents[child[node, lane] - first] = LANES * node + lane
     normals = np.zeros((n_nodes, 3))
     _set_normals(blocks, child, parents, normals)
     reached = np.zeros((n_nodes, 3))
@@ -128,10 +129,10 @@ def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, dis
         if child[node, 0] < 0:
             continue
         for lane in range(LANES):
-            below = child[node, lane]
-            if below == EMPTY:
+            if child[node, lane] == EMPTY:
                 discs[node, :, lane] = 0.0
                 continue
+            below = child[node, lane] - first
             middle = 0.5 * (reached[below, 0] + reached[below, 1])
             for k in range(3):
                 discs[node, k, lane] = boxes[node, k, lane] + normals[below, k] * middle

@@ -29,7 +29,7 @@ from engine.running.parallel import Options, Progress, check_options
 from engine.solids.accepted import PoseLike, SolidLike
 from engine.solids.base import Solid, named
 from engine.solids.checks import spell
-from engine.solids.mesh import Surface
+from engine.solids.mesh import Surface, is_large
 from engine.solids.pose import Pose
 from engine.solids.poses import as_pose
 from engine.solids.primitives import Aabb, HalfSpace, Sphere
@@ -268,12 +268,13 @@ def collide(
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)
     is_named, poses = witness and not boolean, (first_pose, second_pose)
-    if deadline is None and cancel is None and progress is None and not (detail or report):
+    is_free = deadline is None and cancel is None and progress is None
+    if is_free and not (detail or report) and (workers is None or not is_large(first, second)):
         return collide_pair(first, second, poses, result.UNCOUNTED[bool(is_named), bool(boolean)])
     pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         budget.check()
         work = result.Work(budget, witness=is_named, boolean=boolean)
         answer = collide_pair(first, second, poses, work)

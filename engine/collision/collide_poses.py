@@ -28,6 +28,7 @@ from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.accepted import PosesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
+from engine.solids.mesh import is_large
 from engine.solids.pose import Pose, motion_of
 from engine.solids.poses import Poses, as_pose_arrays, check_pose_arrays
 from engine.solids.primitives import Sphere
@@ -144,11 +145,12 @@ def collide_poses(
         one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)
     poses, deadline = read_poses(rotations, translations, first.dimension, workers, deadline, cancel)
     n_poses = len(poses.rotations)
-    if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
+    is_free = deadline is None and cancel is None and progress is None
+    if n_poses == 1 and is_free and not (detail or report) and (workers is None or not is_large(first, second)):
         one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
         alone = _ALONE[one.relation].copy()
         return (alone, [one.witness]) if witnesses else alone
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         budget.check()
         has_detail = detail and one_pair.has_interior(first, budget) and one_pair.has_interior(second, budget)
         details, relations = np.full(n_poses, one_pair.NO_DETAIL, np.int8), np.full(n_poses, UNSETTLED, np.int8)

@@ -83,6 +83,11 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _kernel(function, _nrt=False)
 
 
+def as_kernel(function: Any) -> Any:
+    """Compile a `called` function as a `kernel` too: what is loaded from the cache cannot be called by another."""
+    return kernel(getattr(function, "py_func", function))
+
+
 def allocating_kernel(function: Callable[..., Any]) -> Any:
     """Compile as `kernel` does, for one that makes arrays: it counts references to them, and returns some maybe."""
     return _kernel(function)

@@ -209,7 +209,7 @@ def locate(
         array = as_points(points, solid.dimension, must_be_finite=False)
     deadline, locations = reader.left(), np.empty(len(array), np.int8)
     beyond, rational = [], []
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         budget.check()
         locator = choice.chosen(len(array), budget)
 

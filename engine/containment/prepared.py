@@ -24,10 +24,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import Axis, cell_of, make_axis
-from engine.bounding.bvh import WIDTH, build_stretched_bvh, empty_rows
+from engine.bounding.bvh import WIDTH, empty_rows
+from engine.bounding.trees import MANY, boxes_of, build_stretched_bvh
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
-from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, reorder_by_tree
+from engine.containment.methods.polyhedron_ray_parity import reorder_by_tree
 from engine.containment.methods.rational_locate import Check, no_check, prism_walls
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.faces import OVERHEAD_ROWS
@@ -242,6 +243,8 @@ EXACT: Final = np.zeros(0)
 
 IN_TREE, IN_TREE_A_FACE_OVER = 150.0, 2.0
 """Nanoseconds that a point takes in a tree, and for each face box above the point (policy.py)."""
+_FILL_SECONDS: Final = 4e-8
+"""Time for each triangle of a tree."""
 SAMPLE: Final = 256
 """Number of faces that `mean_faces_above` looks at."""
 
@@ -267,25 +270,26 @@ class TriangleTree(NamedTuple):
 
 
 def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
-    """Return the `TriangleTree` of a polyhedron, built at first use. check: called between the steps (a second for a
-    million triangles); what it raises ends the construction."""
-    return solid.prepared("tree", lambda: _build_tree(solid, check), check)
+    """Return the `TriangleTree` of a polyhedron, built at first use. check: called while another thread builds it; what
+    it raises ends the waiting."""
+    return solid.prepared("tree", lambda: build_tree(solid), check)
 
 
-def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
-    check()
-    boxes, triangles = np.empty((len(solid.triangles), 6)), np.empty((len(solid.triangles), 3), np.int32)
-    fill_triangle_boxes(solid.vertices, solid.triangles, boxes)
-    check()
-    x, y, z, u, v, w = boxes.T
-    low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
-    tree, origin, scale = build_stretched_bvh(boxes)
-    check()
-    child, blocks = np.empty_like(tree.child), empty_rows((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
-    blocks[:] = 0.0
-    reorder_by_tree(solid.vertices, solid.triangles, tree, origin, scale, child, triangles, blocks)
-    check()
-    places = tuple(origin.tolist()), tuple(scale.tolist()), low, high
+def build_tree(solid: Polyhedron, many: int = MANY) -> TriangleTree:
+    """Build the `TriangleTree` of a polyhedron, on threads from `many` faces on. Raises: DeadlineExceededError,
+    CancelledError."""
+    boxes, triangles = boxes_of(solid.vertices, solid.triangles, many), np.empty((len(solid.triangles), 3), np.int32)
+    tree, origin, scale, ends = build_stretched_bvh(boxes, many)
+    x, y, z, u, v, w = ends.tolist()
+    child, blocks = tree.child.copy(), empty_rows((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
+
+    def fill(nodes: slice, first: int) -> None:
+        given = solid.vertices, solid.triangles, tree.boxes[nodes], tree.child[nodes], origin, scale
+        reorder_by_tree(*given, first, child[nodes], triangles, blocks[nodes])
+
+    blocks[: tree.n_above] = 0.0
+    tree.each(fill, _FILL_SECONDS)
+    places = tuple(origin.tolist()), tuple(scale.tolist()), (x, y, z), (u, v, w)
     return TriangleTree(solid.vertices, triangles, tree.boxes, child, read_only(blocks), *places)
 
 

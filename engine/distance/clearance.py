@@ -26,6 +26,7 @@ from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown
+from engine.solids.mesh import is_large
 from engine.solids.pose import Pose
 from engine.solids.primitives import HalfSpace
 from engine.types import Accuracy, BoolArray, FloatArray, Relation, read_only
@@ -136,9 +137,10 @@ def clearance(
         check_options(workers, progress, report=report)
     least = None if at_least is None else checked_distance(at_least)
     poses = first_pose, second_pose
-    if deadline is None and cancel is None and progress is None and not report:
+    is_free = deadline is None and cancel is None and progress is None
+    if is_free and not report and (workers is None or not is_large(first, second)):
         return _answer(first, second, poses, least, UNLIMITED)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         budget.check()
         answer = _answer(first, second, poses, least, budget)
     if progress is not None:
@@ -276,7 +278,7 @@ def clearance_poses(
     poses, deadline = read_poses(rotations, translations, first.dimension, workers, deadline, cancel)
     n_poses = len(poses.rotations)
     answers = np.full(n_poses, np.nan if least != 0.0 else np.inf)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         batch = _Batch(first, second, poses, budget)
 
         def task(start: int, stop: int) -> None:

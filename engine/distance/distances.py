@@ -303,7 +303,7 @@ def distances(
         moved = posed(pose, placed, "pose")
         if signed and not has_inside(body):
             raise InvalidOperationError(f"signed: no inside to be negative in ({body.type}); leave it out", ("signed",))
-    with Budget(reader.left(), cancel) as budget:
+    with Budget(reader.left(), cancel, workers) as budget:
         budget.check()
         query = PointQuery(array, body, moved, limit, nearest, budget, to == "boundary", signed)
         run_chunks(

@@ -39,6 +39,7 @@ import numpy as np
 
 from engine.compiling.jit import inline
 from engine.lanes.lanes import (
+    across,
     any_above,
     bits_of,
     bytes_of,
@@ -150,6 +151,19 @@ def fill(rows: Rows, row: int, value: Number) -> None:
 def join(boxes: Rows, box: int, others: Rows, other: int) -> None:
     """Set row `box` to the elementwise minimum of itself and row `other` of another array: the box around both."""
     store(boxes, box, lesser(load(boxes, box), load(others, other)))
+
+
+@traced
+def join_centre(centres: Rows, box: int, others: Rows, other: int) -> None:
+    """Set row `box` to the box around it and the centre of row `other`, both low x, y, z, 0, then minus high."""
+    row = load(others, other)
+    store(centres, box, lesser(load(centres, box), (row - across(row, LANES // 2)) * 0.5))
+
+
+@traced
+def copy_row(rows: Rows, i: int, others: Rows, j: int) -> None:
+    """Set row i to row j of another array."""
+    store(rows, i, load(others, j))
 
 
 @traced

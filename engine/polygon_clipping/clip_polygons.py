@@ -196,7 +196,7 @@ def clip_polygons(
     if plan is not None and contours is not None and len(contours.vertices) <= FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:
-        with Budget(deadline, cancel) as budget:
+        with Budget(deadline, cancel, workers) as budget:
             plan = plan_of(region, budget.check)
             contours = as_contours(polygons, region.dimension, workers, budget) if contours is None else contours
             clipped, n_beyond, n_rational = _clip(contours, plan, budget, workers, progress)

@@ -281,7 +281,7 @@ def overlay_batch(
         )
     parts: dict[int, PairResults] = {}
     selected = SELECTED_ARRAYS[operation]
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
 
         def task(start: int, stop: int) -> None:
             # Gathered here, chunk by chunk: by all threads, and what was written is near.

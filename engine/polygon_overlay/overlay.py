@@ -308,7 +308,7 @@ def union_all(
     [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]]
     """
     check_options(workers, progress, report=report)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         result, accuracy = _arrange_all(polygons, Rule.ANY, budget, grid, workers)
     if progress is not None:
         progress(1)

@@ -164,8 +164,8 @@ def poll() -> None:
 
 
 def current() -> Budget:
-    """Return the budget under which this thread works, `UNLIMITED` without one."""
-    return getattr(_here, "budget", None) or UNLIMITED
+    """Return the budget under which this thread works, a new one without."""
+    return getattr(_here, "budget", None) or Budget()
 
 
 def reading(deadline: float | None, cancel: Cancel | None) -> Budget:
@@ -205,11 +205,12 @@ def _polled(items: Iterable[Item]) -> Iterator[Item]:
 class Budget:
     """Deadline and cancel switch of one call; as a context manager it is also checked by `poll`.
 
-    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. around: the
-    budget under which this one was entered. `flag` is the one-element uint8 array that kernels poll.
+    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. workers: threads
+    that may prepare what the call needs (`parallel.share`); None: those of the budget around, else as many as pay.
+    around: the budget under which this one was entered. `flag` is the one-element uint8 array that kernels poll.
     """
 
-    def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
+    def __init__(self, deadline: float | None = None, cancel: Cancel | None = None, workers: int | None = None) -> None:
         if deadline is not None and (
             isinstance(deadline, bool) or not isinstance(deadline, (int, float)) or deadline != deadline  # NaN
         ):
@@ -221,15 +222,17 @@ class Budget:
         longest = threading.TIMEOUT_MAX  # of the timer, some centuries: more than that is no limit
         self.deadline = None if deadline is None or deadline > longest else float(max(deadline, -longest))
         self.flag: FlagArray = np.zeros(1, np.uint8)
-        self.cancel = cancel
+        self.cancel, self.workers = cancel, workers
         self._end = None if self.deadline is None else time.monotonic() + self.deadline
         self._waiting: _Waiting | None = None
         self.around: Budget | None = None
 
     def __enter__(self) -> Budget:
-        if self.cancel is None and self._end is None:  # nothing to poll for
+        if self.cancel is None and self._end is None and self.workers is None:  # nothing to ask for
             return self
         self.around, _here.budget = getattr(_here, "budget", None), self
+        if self.workers is None and self.around is not None:
+            self.workers = self.around.workers
         if self.cancel is not None:
             self.cancel.attach(self.flag)
         if self._end is not None:
@@ -237,7 +240,7 @@ class Budget:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.cancel is None and self._end is None:
+        if self.cancel is None and self._end is None and self.workers is None:
             return
         _here.budget = self.around
         if self._waiting is not None:

@@ -37,7 +37,7 @@ from typing import Final, TypedDict
 import numpy as np
 
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
-from engine.running.budget import Budget, Cancel, shown, work_under
+from engine.running.budget import Budget, Cancel, current, poll, shown, work_under
 
 Progress = Callable[[int], object]
 """Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""
@@ -211,6 +211,18 @@ def run_chunks(
         chunk, pace = _next_chunk(stop - done, seconds, CHUNK_SECONDS), seconds / (stop - done)
         done = stop
     budget.check()
+
+
+def share(task: Callable[[int, int], object], n_items: int, pace: float) -> None:
+    """Call ``task(start, stop)`` as `run_chunks` does, for a structure that the call of this thread needs: with its
+    budget, and its workers. pace: seconds an item takes. Raises: as `run_chunks`."""
+    poll()
+    if n_items * pace > CHUNK_SECONDS:
+        budget, chunk = current(), max(1, int(CHUNK_SECONDS / pace))
+        run_chunks(task, n_items, budget=budget, first_chunk=chunk, workers=budget.workers, pace=pace)
+    elif n_items:
+        task(0, n_items)
+        poll()
 
 
 def _next_chunk(n_items: int, seconds: float, target: float) -> int:

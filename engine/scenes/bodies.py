@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from engine.bounding.aabb import place_boxes
-from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
+from engine.bounding.bvh import UNUSED, WIDTH, Bvh
+from engine.bounding.trees import build_bvh
 from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.collision.collide import posed
 from engine.compiling.jit import entry_of
@@ -263,6 +264,7 @@ _NO_TREE: Final = Bvh(
     read_only(np.full((1, WIDTH), EMPTY, np.int32)),
     read_only(np.zeros(3)),
     1.0,
+    np.zeros((2, 2), np.int64),
 )
 _NO_NUMBERS: Final = read_only(np.array([1.0, 0.0, 0.0, 0.0]))
 _ADDRESSES: Final[dict[int, int]] = {

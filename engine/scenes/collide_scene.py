@@ -179,7 +179,7 @@ def collide_scene(
     """
     check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     query = PairQuery(skip, only, gap, witnesses, boolean, detail)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         batches = SceneBatches(scene_bodies(solids, poses))
         pairs = collide_bodies(batches, query, budget, workers, progress)
     return pairs if report else pairs[0]

@@ -97,7 +97,7 @@ def hits(
     code, scene = code_of_keep(keep), self._placements
     with reading(deadline, cancel) as reader:
         lines = plain_lines(read_only(as_point_groups(segments, 2, 3, ("segments",))), rays)
-    with Budget(reader.left(), cancel) as budget:
+    with Budget(reader.left(), cancel, workers) as budget:
         answer, n_open = _on_bodies(lines, scene, code, budget, workers)
     if progress is not None and len(lines.rows):
         progress(len(lines.rows))

@@ -58,7 +58,7 @@ class PointQueries(Immutable):
         """
         check_options(workers, progress, report=report)
         array = as_points(points, self._dimension, must_be_finite=False)
-        with Budget(deadline, cancel) as budget:
+        with Budget(deadline, cancel, workers) as budget:
             answer = locate_all(array, self._placements, budget, workers, progress)
         return answer if report else answer[0]
 
@@ -114,7 +114,7 @@ class PointQueries(Immutable):
             raise EmptyGeometryError("a scene without bodies has no point to be near", ("bodies",))
         limit = None if within is None else checked_distance(within, "within")
         array = as_points(points, self._dimension)
-        with Budget(deadline, cancel) as budget:
+        with Budget(deadline, cancel, workers) as budget:
             answer: Any = measure_all(array, self._placements, limit, budget, workers, progress)
         return answer if report else answer[0]
 

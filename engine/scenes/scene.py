@@ -182,7 +182,7 @@ class Scene(PointQueries):
         """
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
         query = PairQuery(skip, only, gap, witnesses, boolean, detail)
-        with Budget(deadline, cancel) as budget:
+        with Budget(deadline, cancel, workers) as budget:
             if moved is None or not len(self):
                 self._named([] if moved is None else moved, "moved")
                 pairs = collide_bodies(self._placements.whole().batches(budget), query, budget, workers, progress)
@@ -305,7 +305,7 @@ class Scene(PointQueries):
         array = as_point_groups(segments, 2, dimension, where, must_be_finite=False)
         n = len(array)
         counts = Counts(n)
-        with Budget(deadline, cancel) as budget:
+        with Budget(deadline, cancel, workers) as budget:
             check_finite(array, where, budget, workers)
             self._placements.base.check_cut(budget)
             result: ScenePieces | BoolArray

@@ -20,6 +20,7 @@ from engine.solids.accepted import LinesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
 from engine.solids.columns import Columns
+from engine.solids.mesh import is_large
 from engine.solids.pictures import Pictured
 from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, rows_between, rows_of
 from engine.solids.registry import refused, row_of
@@ -151,10 +152,10 @@ def clip_segments(
             plan = plan_for(region)
             array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks
         deadline = reader.left()
-    if is_free and len(array) <= plan.few:
+    if is_free and len(array) <= plan.few and (workers is None or not is_large(solid)):
         clipped, n_beyond, n_rational = plan.cut(array, region, plan, UNLIMITED, workers, None)
     else:
-        with Budget(deadline, cancel) as budget:
+        with Budget(deadline, cancel, workers) as budget:
             clipped, n_beyond, n_rational = plan.cut(array, region, plan, budget, workers, progress)
     source, (start, end), t, faces = clipped
     pieces = SegmentPieces(source, start, end, t, faces)

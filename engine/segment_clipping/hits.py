@@ -196,7 +196,7 @@ def hits(
         if make is None:
             raise refused(solid, "hits does not take", lambda row: row.hits, where=("surface",))
         lines = read_only(as_point_groups(segments, 2, 3, ("segments",)))
-    with Budget(reader.left(), cancel) as budget:
+    with Budget(reader.left(), cancel, workers) as budget:
         target = make(solid, budget)
         columns, left = find(plain_lines(lines, rays), target, code, budget, workers, progress)
         answer = columns if code == ANY else with_faces(columns, target, target.normals[columns[3]], budget)

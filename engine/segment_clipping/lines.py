@@ -24,6 +24,7 @@ from engine.segment_clipping.pieces import Pieces
 from engine.solids.accepted import LinesLike, SolidLike
 from engine.solids.checks import as_points, shown
 from engine.solids.geometries import lines_in, note_altitude
+from engine.solids.mesh import is_large
 from engine.solids.pictures import Pictured
 from engine.solids.poses import axes_of
 from engine.solids.ragged import Ragged, as_lines
@@ -167,7 +168,6 @@ def clip_lines(
     check_options(workers, progress, report=report)
     if not isinstance(keep, str) or keep not in ("inside", "outside"):
         raise InvalidInputError(f"keep must be inside or outside, got {shown(keep)}", ("keep",))
-    is_free = is_unlimited(workers, deadline, cancel, progress)
     with reading(deadline, cancel) as reader:
         region = as_solid(region, "region")
         plan = plan_for(region)
@@ -183,7 +183,9 @@ def clip_lines(
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, region.dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]
-    with UNLIMITED if is_free and len(firsts) <= plan.few else Budget(deadline, cancel) as budget:
+    is_free = len(firsts) <= plan.few and is_unlimited(workers, deadline, cancel, progress)
+    is_free &= workers is None or not is_large(region)
+    with UNLIMITED if is_free else Budget(deadline, cancel, workers) as budget:
         pieces, n_beyond, n_rational = plan.cut(read_only(segments), region, plan, budget, workers, progress)
         made = _joined(pieces, firsts, vertices, offsets, budget)
         if keep == "outside":

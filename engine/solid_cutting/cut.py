@@ -198,7 +198,7 @@ def cut(
     check_options(workers, progress, report=report, measures=measures)
     if region.dimension != 3:
         raise WrongDimensionError(f"region is of dimension {region.dimension}; cut takes solids of space", ("region",))
-    with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
+    with Budget(deadline, cancel, workers) as budget, np.errstate(all="ignore"):
         budget.check()
         planes = planes_in(region, budget)
         parts = []

@@ -205,7 +205,7 @@ def _measured(
 ) -> Any:  # fmt: skip
     body, deadline = read_argument(solid, deadline, cancel)
     check_options(workers, progress, report=report)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         budget.check()
         value, is_exact = measure(body, what, budget)
     if progress is not None:

@@ -192,7 +192,7 @@ def section(
     """
     body, deadline = as_polyhedron(solid, "section", deadline, cancel)
     check_options(workers, progress, report=report, measures=measures)
-    with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
+    with Budget(deadline, cancel, workers) as budget, np.errstate(all="ignore"):
         budget.check()
         rows, axis, heights = _rows_of(planes, normal, budget)
         made = slices_at(body, rows, axis, heights, budget)

@@ -119,7 +119,7 @@ def bounds(
     """
     solid, deadline = read_argument(solid, deadline, cancel)
     check_options(workers, progress, report=report)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel, workers) as budget:
         budget.check()
         result, accuracy = solid.prepared("bounds", lambda: _bounds_of(solid, budget), budget.check)
     if progress is not None:

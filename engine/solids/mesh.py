@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 import numpy.typing as npt
 
+from engine.bounding.trees import MANY
 from engine.compiling.jit import entry_of
 from engine.errors import (
     InconsistentOrientationError,
@@ -264,6 +265,12 @@ def _unbalanced_edges(
     ]
     more = "; ..." if n > len(lines) else ""
     return kind(f"{n} edges {claim}: {'; '.join(lines)}{more}; {advice}", ("faces", int(named[0, 0])))
+
+
+def is_large(first: Solid, second: Solid | None = None) -> bool:
+    """Return whether any of these is a mesh whose trees are built on threads."""
+    is_first = isinstance(first, Mesh) and len(first.triangles) >= MANY
+    return is_first or (isinstance(second, Mesh) and len(second.triangles) >= MANY)
 
 
 class Polyhedron(Mesh):

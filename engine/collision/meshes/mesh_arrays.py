@@ -9,20 +9,22 @@ from __future__ import annotations
 from collections import namedtuple
 from dataclasses import dataclass
 from math import frexp, ldexp
+from typing import Any
 
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
 from engine.bounding.aabb import corners_of_box, fill_discs
-from engine.bounding.bvh import WIDTH, build_balanced_bvh
+from engine.bounding.bvh import WIDTH, Bvh
+from engine.bounding.large_trees import by_range
+from engine.bounding.trees import MANY, boxes_of, build_balanced_bvh
 from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Facet, facet_at, projected
-from engine.compiling.jit import allocating_kernel, inline, kernel
-from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
+from engine.compiling.jit import inline, kernel
 from engine.lanes.boxes import DISC_ROWS, EMPTY
 from engine.lanes.faces import CORNER_ROWS, NOWHERE
 from engine.predicates.orientation import orient2d
-from engine.predicates.vectors import as_point3, cross, minus
+from engine.predicates.vectors import cross, minus
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh, Polyhedron
 from engine.solids.pose import Pose
@@ -51,6 +53,10 @@ STATE_STACKED = 2
 """
 
 
+_HUGE = 2.0**60
+"""Size of a disc that separates nothing."""
+_PLACE_SECONDS, _TAKE_SECONDS, _FILL_SECONDS = 2e-8, 2e-8, 1.2e-7
+"""Time for each triangle, vertex and triangle."""
 STILL = PoseArrays(read_only(np.eye(3)[None]), read_only(np.zeros((1, 3))), False)
 """The identity as pose of a body that has none."""
 
@@ -111,27 +117,29 @@ def _built(solid: Solid) -> MeshBody:
     return mesh_body_of_triangles(*given, isinstance(solid, Polyhedron))
 
 
-def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:
-    """Build the mesh of checked vertices (n, 3) and triangles (m, 3). faces (m,): the caller's face number of each
-    triangle; has_inside: False for a surface. Triangles and vertices are copied in the order of the tree, so that faces
-    near a contact are close in memory; large meshes under many poses depend on it."""
+def mesh_body_of_triangles(
+    vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool, many: int = MANY
+) -> MeshBody:
+    """Build the mesh of checked vertices (n, 3) and triangles (m, 3), on threads from `many` triangles on. faces (m,):
+    the caller's face number of each triangle; has_inside: False for a surface. Triangles and vertices are copied in the
+    order of the tree, so that faces near a contact are close in memory; large meshes under many poses depend on it."""
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
-    boxes = np.empty((n_triangles, 6))
-    fill_triangle_boxes(vertices, triangles, boxes)
-    tree = build_balanced_bvh(boxes)
-    child, order = tree.child.copy(), np.empty(n_triangles, np.int64)
+    tree = build_balanced_bvh(boxes_of(vertices, triangles, many), many)
+    child, order = np.empty_like(tree.child), np.empty(n_triangles, np.int64)
     ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
-    used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
-    with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
-        given = vertices, triangles, faces
-        n_used, n_components, first_face = _reorder_by_tree(*given, child, order, ordered, used, axis, components)
-        reach, lowest_bit, shift = _lattice_of(used[:n_used])
-    blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
-    _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks, sizes := np.zeros(3))
-    discs = np.empty((len(child), DISC_ROWS, WIDTH), np.float32)
-    fill_discs(blocks, child, tree.boxes, discs)
-    used = used[:n_used].copy() if n_used < len(used) else used
+    number, old = np.full(len(vertices), -1, np.int64), np.empty(len(vertices), np.int64)
+    components = np.empty(n_triangles, np.int64)
+
+    def place(nodes: slice, first: int) -> None:
+        _list_triangles(triangles, tree.child[nodes], first, child[nodes], order, ordered)
+
+    if above := tree.n_above:
+        child[:above] = tree.child[:above]
+    tree.each(place, _PLACE_SECONDS)
+    n_used, n_components, first_face = _number_vertices(ordered, faces, order, number, old, components)
+    used, (reach, lowest_bit, shift) = _taken(vertices, old[:n_used], many)
+    blocks, discs, sizes = _rows_of(tree, child, used, ordered, axis)
     arrays = MeshArrays(
         read_only(used), read_only(ordered), read_only(axis), np.full(n_triangles, STATE_UNKNOWN, np.int8),
         np.zeros(n_triangles, np.int8), tree.boxes, read_only(child), read_only(blocks), read_only(discs), tree.origin,
@@ -141,46 +149,89 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     return MeshBody(arrays, shift)
 
 
-@allocating_kernel
-def _reorder_by_tree(
-    vertices: FloatArray, triangles: IntArray, faces: IntArray, child: Int32Array, order: IntArray, ordered: IntArray,
-    used: FloatArray, axis: Int8Array, components: IntArray,
-) -> tuple[int, int, int]:  # fmt: skip
-    """Renumber triangles and vertices in the order of the tree's leaves.
+def _rows_of(
+    tree: Bvh, child: Int32Array, vertices: FloatArray, triangles: IntArray, axis: Int8Array
+) -> tuple[Float32Array, Float32Array, FloatArray]:
+    """Return blocks, discs and sizes, see `MeshArrays`, and fill axis (n,). child: of the tree, triangles renumbered.
+    Discs of nodes above the parts of a tree are so large that they separate nothing."""
+    blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
+    discs, each = np.empty((len(child), DISC_ROWS, WIDTH), np.float32), []
 
-    child: of the tree, its leaf entries rewritten. Filled: order (n,), the old number of each triangle; ordered (n, 3),
-    its vertices; used (n_vertices, 3), their coordinates; axis (n,), `axis_of`; components, the first triangle of each
-    set of triangles connected through vertices. Returns the number of used vertices, the number of components, and the
-    least face number in the component of the first triangle."""
-    n_triangles = n_used = n_components = 0
-    number = np.full(vertices.shape[0], -1, np.int64)
-    for node in range(child.shape[0]):
+    def fill(nodes: slice, _: int) -> None:
+        own, some, sizes = child[nodes], blocks[nodes], np.zeros(3)
+        _fill_blocks(vertices, triangles, own, tree.origin, tree.scale, some, axis, sizes)
+        fill_discs(some, own, tree.boxes[nodes], discs[nodes], nodes.start)
+        each.append(sizes)
+
+    if above := tree.n_above:
+        discs[:above, :3], discs[:above, 3:6], discs[:above, 6:] = tree.boxes[:above, :3], 1.0, _HUGE
+    tree.each(fill, _FILL_SECONDS)
+    return blocks, discs, np.max(each, axis=0) if len(each) > 1 else each[0]
+
+
+def _taken(vertices: FloatArray, old: IntArray, many: int) -> tuple[FloatArray, tuple[float, int, int]]:
+    """Return the rows `old` of vertices (n, 3), and `_lattice_of` them."""
+    used, each = np.empty((len(old), 3)), []
+
+    def take(start: int, stop: int) -> None:
+        np.take(vertices, old[start:stop], axis=0, out=used[start:stop], mode="clip")
+        each.append(_lattice_of(used[start:stop]))
+
+    if len(old) < many:
+        take(0, len(old))
+        return used, each[0]
+    by_range(take, len(old), _TAKE_SECONDS)
+    reaches, bits, shifts = zip(*([own for own in each if own[0] > 0.0] or each))
+    return used, (max(reaches), min(bits), max(shifts))
+
+
+@kernel
+def _list_triangles(
+    triangles: IntArray, given: Int32Array, first: int, child: Int32Array, order: IntArray, ordered: IntArray
+) -> None:
+    """Renumber the triangles of some nodes of a tree in the order of its leaves, from `first` on.
+
+    given: children of the nodes. Filled: child, the same with leaf entries renumbered; order (n,), the old number of
+    each triangle; ordered (n, 3), its vertices."""
+    item = first
+    for node in range(len(child)):
         for lane in range(WIDTH):
-            if child[node, lane] >= 0 or child[node, lane] == EMPTY:
-                continue
-            item = n_triangles
-            order[item] = -1 - child[node, lane]
-            child[node, lane] = -1 - item
-            n_triangles += 1
-            for corner in range(3):
-                vertex = triangles[order[item], corner]
-                if number[vertex] < 0:
-                    number[vertex] = n_used
-                    used[n_used, 0], used[n_used, 1], used[n_used, 2] = as_point3(vertices, vertex)
-                    n_used += 1
-                ordered[item, corner] = number[vertex]
-            axis[item] = axis_of(facet_at(used, ordered[item, 0], ordered[item, 1], ordered[item, 2]))
-    parent = np.empty(n_used, np.int64)
-    _union(ordered, np.zeros(n_triangles, np.bool_), parent)
-    number[:n_used] = 0
-    first_face = faces[order[0]]
-    for item in range(n_triangles):
+            entry = given[node, lane]
+            child[node, lane] = entry
+            if entry < 0 and entry != EMPTY:
+                child[node, lane], order[item] = -1 - item, -1 - entry
+                for corner in range(3):
+                    ordered[item, corner] = triangles[-1 - entry, corner]
+                item += 1
+
+
+@kernel
+def _number_vertices(
+    ordered: IntArray, faces: IntArray, order: IntArray, number: IntArray, old: IntArray, components: IntArray
+) -> tuple[int, int, int]:
+    """Renumber the vertices of triangles `ordered` (n, 3) by their first use, and list components: the first triangle
+    of each set of triangles connected through vertices.
+
+    number (n_vertices,): -1 on entry, scratch. Filled: old (n_vertices,), the old number of each used vertex;
+    components (n,). Returns the number of used vertices, that of components, and the least face number (faces, order:
+    as of `_list_triangles`) in the component of the first triangle."""
+    n_used = n_components = 0
+    for item in range(len(ordered)):
+        for corner in range(3):
+            vertex = ordered[item, corner]
+            if number[vertex] < 0:
+                number[vertex], old[n_used] = n_used, vertex
+                n_used += 1
+            ordered[item, corner] = number[vertex]
+    parent = number[:n_used]
+    _union(ordered, components[:0], parent)
+    first_face, last = faces[order[0]], -1
+    for item in range(len(ordered)):
         root = parent[ordered[item, 0]]
-        if root == parent[ordered[0, 0]]:
+        if root == 0:
             first_face = min(first_face, faces[order[item]])
-        if number[root] == 0:
-            number[root] = 1
-            components[n_components] = item
+        if root > last:  # components begin in the order of their roots, the least of their vertices
+            components[n_components], last = item, root
             n_components += 1
     return n_used, n_components, first_face
 
@@ -188,11 +239,11 @@ def _reorder_by_tree(
 @kernel
 def _fill_blocks(
     vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float,
-    blocks: Float32Array, sizes: FloatArray,
+    blocks: Float32Array, axis: Int8Array, sizes: FloatArray,
 ) -> None:  # fmt: skip
     """Fill blocks (n_nodes, 9, 8) at the leaf nodes of a tree with the corners of their triangles (x, y, z of each),
-    one triangle a lane, in tree coordinates (p - origin) / scale; `NOWHERE` in unused lanes. sizes (3,): zeros, set to
-    the largest |coordinate| by axis."""
+    one triangle a lane, in tree coordinates (p - origin) / scale; `NOWHERE` in unused lanes. axis (n,): filled with
+    `axis_of` of these triangles; sizes (3,): zeros, set to the largest |coordinate| by axis."""
     for node in range(child.shape[0]):
         if child[node, 0] >= 0:
             continue
@@ -200,8 +251,10 @@ def _fill_blocks(
             if child[node, lane] == EMPTY:
                 blocks[node, :, lane] = NOWHERE
                 continue
+            item = -1 - child[node, lane]
+            axis[item] = axis_of(facet_at(vertices, triangles[item, 0], triangles[item, 1], triangles[item, 2]))
             for corner in range(3):
-                vertex = triangles[-1 - child[node, lane], corner]
+                vertex = triangles[item, corner]
                 for k in range(3):
                     local = (vertices[vertex, k] - origin[k]) / scale
                     blocks[node, 3 * corner + k, lane], sizes[k] = local, max(sizes[k], abs(local))
@@ -281,17 +334,17 @@ def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
 
 @kernel
 def join_vertices(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
-    """Set parent (n_vertices,) to one representative vertex for all vertices connected by triangles (m, 3) that are not
-    left out, left_out (m,) being False."""
+    """Set parent (n_vertices,) to one representative vertex, the least, for all vertices connected by triangles (m, 3)
+    that are not left out, left_out (m,) being False, or (0,) where none is."""
     _union(triangles, left_out, parent)
 
 
 @inline
-def _union(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
+def _union(triangles: IntArray, left_out: Any, parent: IntArray) -> None:
     for vertex in range(parent.shape[0]):
         parent[vertex] = vertex
     for item in range(triangles.shape[0]):
-        if left_out[item]:
+        if len(left_out) > 0 and left_out[item]:
             continue
         for corner in range(1, 3):
             unite(parent, triangles[item, 0], triangles[item, corner])

@@ -29,7 +29,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import LEAST, STACK, WIDTH, Bvh
+from engine.bounding.bvh import LEAST, STACK, WIDTH
 from engine.compiling.jit import allocating_kernel, called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite, orient2d_blurred
 from engine.lanes.boxes import EMPTY, inside_box
@@ -288,31 +288,22 @@ def _locate_each(
 
 
 @kernel
-def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatArray) -> None:
-    """Fill boxes (m, 6) with xmin ymin zmin xmax ymax zmax of triangles (m, 3)."""
-    for triangle in range(len(triangles)):
-        a, b, c = corners_of(vertices, triangles, triangle)
-        boxes[triangle, 0], boxes[triangle, 3] = min(a.x, b.x, c.x), max(a.x, b.x, c.x)
-        boxes[triangle, 1], boxes[triangle, 4] = min(a.y, b.y, c.y), max(a.y, b.y, c.y)
-        boxes[triangle, 2], boxes[triangle, 5] = min(a.z, b.z, c.z), max(a.z, b.z, c.z)
-
-
-@kernel
 def reorder_by_tree(
-    vertices: FloatArray, triangles: IntArray, tree: Bvh, origin: FloatArray, scale: FloatArray, child: Int32Array,
-    ordered: Int32Array, blocks: Float32Array,
+    vertices: FloatArray, triangles: IntArray, boxes: Float32Array, children: Int32Array, origin: FloatArray,
+    scale: FloatArray, place: int, child: Int32Array, ordered: Int32Array, blocks: Float32Array,
 ) -> None:  # fmt: skip
-    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and child with its children, triangles
-    renumbered accordingly. tree, origin, scale: of `build_stretched_bvh`. blocks: (n_nodes, 8, 8) float32, zero on
-    entry; filled with the triangles of each node as `overhead` takes them."""
-    place = 0
+    """Fill ordered (m, 3) int32, from row `place` on, with the triangles in the order of nodes of a `Bvh`, and child
+    with children of these nodes, triangles renumbered accordingly. boxes, children: of the nodes; origin, scale: of
+    `build_stretched_bvh`. blocks: (n_nodes, 8, 8) float32; filled with the triangles of each node as `overhead` takes
+    them, zeros in other lanes."""
     for node in range(len(child)):
-        centre_x, centre_y = float(tree.boxes[node, 0, 0]), float(tree.boxes[node, 1, 0])
+        centre_x, centre_y = float(boxes[node, 0, 0]), float(boxes[node, 1, 0])
         reach = 0.0
         for lane in range(WIDTH):
-            triangle = -1 - tree.child[node, lane]
-            child[node, lane] = tree.child[node, lane]
-            if triangle < 0 or tree.child[node, lane] == EMPTY:
+            triangle = -1 - children[node, lane]
+            child[node, lane] = children[node, lane]
+            if triangle < 0 or children[node, lane] == EMPTY:
+                blocks[node, :, lane] = 0.0
                 continue
             for corner in range(3):
                 vertex = triangles[triangle, corner]

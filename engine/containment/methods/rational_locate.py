@@ -17,7 +17,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, list_uncertain
+from engine.bounding.trees import boxes_of
+from engine.containment.methods.polyhedron_ray_parity import list_uncertain
 from engine.errors import UnsupportedSolidError
 from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import (
@@ -115,8 +116,7 @@ def triangle_boxes(solid: Polyhedron) -> FloatArray:
     """Return (6, n_triangles): rows xmin, xmax, ymin, ymax, zmin, zmax of the boxes of the triangles, made once."""
 
     def build() -> FloatArray:
-        boxes = np.empty((len(solid.triangles), 6))
-        fill_triangle_boxes(solid.vertices, solid.triangles, boxes)
+        boxes = boxes_of(solid.vertices, solid.triangles)
         return np.ascontiguousarray(boxes.reshape(-1, 2, 3).transpose(2, 1, 0).reshape(6, -1))
 
     return solid.prepared("triangle_boxes", build)

@@ -13,22 +13,24 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.bounding.bvh import UNUSED, Bvh, build_stretched_bvh, cache_aligned
+from engine.bounding.bvh import UNUSED, Bvh, empty_rows
+from engine.bounding.large_trees import by_range
 from engine.bounding.morton import morton_codes
+from engine.bounding.trees import MANY, boxes_of, build_stretched_bvh
+from engine.compiling.jit import kernel
 from engine.containment.methods.rational_locate import next_in_ring
-from engine.lanes.boxes import EMPTY
+from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.lanes.faces import CORNER_ROWS
 from engine.lanes.tracing import LANES
 from engine.predicates.rational import are_all_safe
-from engine.running.budget import poll
 from engine.segment_clipping.on_boundary.contacts import LEAF_SIZE
 from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Triangle
 from engine.types import Float32Array, FloatArray, Int32Array, IntArray, read_only
 
-_ITEMS: Final = 1 << 16
-"""Triangles placed between two checks of the deadline."""
+_TAKE_SECONDS, _MOVE_SECONDS = 2e-8, 6e-8
+"""Time for each triangle."""
 _BITS: Final = 20
 """Bits of each coordinate in the Morton code."""
 
@@ -65,7 +67,7 @@ class Mesh(NamedTuple):
     n_inner: int
     """Number of inner nodes; the first is the root, unless there is one block only."""
     corners: Float32Array
-    """(n_blocks, 9, 8), see `corners_of`."""
+    """(n_blocks, 9, 8), see `_move_nodes`."""
 
 
 def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | Mesh:
@@ -73,7 +75,7 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
 
     def build() -> Outline | Mesh:
         if isinstance(region, Polyhedron | Surface):
-            return mesh_of(region.vertices[region.triangles], region.triangle_faces)
+            return mesh_of(region.vertices, region.triangles, region.triangle_faces)
         following = next_in_ring(region)
         first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
         offsets = region.ring_offsets if isinstance(region, Polygon) else np.array([0, len(first)])
@@ -123,45 +125,73 @@ def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
     return np.argsort(np.repeat(keys, np.diff(offsets)), kind="stable")
 
 
-def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
-    """Build the boundary of a mesh from its triangles (k, 3, 3). faces: the caller's number of the face of each."""
-    low, high = (pick(pick(elements[:, 0], elements[:, 1]), elements[:, 2]) for pick in (np.minimum, np.maximum))
-    poll()
-    stretched, origin, scale = build_stretched_bvh(np.concatenate([low, high], axis=1))
-    tree, n_inner = _inner_first(stretched)
+def mesh_of(vertices: FloatArray, triangles: IntArray, faces: IntArray, many: int = MANY) -> Mesh:
+    """Build the boundary of a mesh from its vertices (n, 3) and triangles (k, 3), on threads from `many` triangles on.
+    faces: the caller's number of the face of each."""
+    tree, origin, scale, _ = build_stretched_bvh(boxes_of(vertices, triangles, many), many)
+    elements, are_safe = empty_rows((len(triangles), 3, 3), np.float64), []
+
+    def take(first: int, last: int) -> None:
+        np.take(vertices, triangles[first:last], axis=0, out=elements[first:last], mode="clip")
+        are_safe.append(are_all_safe(elements[first:last]))
+
+    if len(triangles) < many:
+        take(0, len(triangles))
+    else:
+        by_range(take, len(triangles), _TAKE_SECONDS)
     with np.errstate(over="ignore"):  # of a mesh of denormal size: what is no number separates nothing
-        inverse = 1.0 / scale
-    return Mesh(
-        cache_aligned(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, origin,
-        read_only(inverse), n_inner, corners_of(tree, n_inner, (elements, origin, inverse)),
-    )  # fmt: skip
+        inverse = read_only(1.0 / scale)
+    nodes, child, n_inner, corners = _inner_first(tree, (elements, origin, inverse))
+    return Mesh(read_only(elements), all(are_safe), read_only(faces), nodes, child, origin, inverse, n_inner, corners)
 
 
-def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
-    """Return a tree with its inner nodes moved before its leaf blocks, and the number of inner nodes."""
+def _inner_first(
+    tree: Bvh, local: tuple[FloatArray, FloatArray, FloatArray]
+) -> tuple[Float32Array, Int32Array, int, Float32Array]:
+    """Return boxes and children of a tree with its inner nodes moved before its leaf blocks; the number of inner nodes;
+    and the corners of the blocks' triangles, see `_move_nodes`. local: elements (k, 3, 3), origin and 1 / scale
+    (3,)."""
     is_block = tree.child[:, 0] < 0
-    order = np.argsort(is_block, kind="stable")
-    place = np.empty(len(order), np.int32)
-    place[order] = np.arange(len(order))
-    child = tree.child[order]
-    child = np.where(child >= 0, place[np.maximum(child, 0)], child)
-    return Bvh(cache_aligned(tree.boxes[order]), cache_aligned(child), tree.origin, tree.scale), int((~is_block).sum())
+    n_blocks = int(np.count_nonzero(is_block))
+    n_inner = len(is_block) - n_blocks
+    place = np.where(
+        is_block, np.cumsum(is_block, dtype=np.int32) + (n_inner - 1), np.cumsum(~is_block, dtype=np.int32) - 1
+    )
+    boxes, child = empty_rows(tree.boxes.shape, np.float32), empty_rows(tree.child.shape, np.int32)
+    corners = empty_rows((n_blocks, CORNER_ROWS, LANES), np.float32)
+    entry = local[0], *local[1:], place, n_inner, boxes, child, corners
+
+    def move(nodes: slice, first: int) -> None:
+        _move_nodes(tree.boxes, tree.child, nodes.start, nodes.stop, *entry)
+
+    if above := tree.n_above:
+        _move_nodes(tree.boxes, tree.child, 0, above, *entry)
+    tree.each(move, _MOVE_SECONDS)
+    return read_only(boxes), read_only(child), n_inner, read_only(corners)
 
 
-def corners_of(tree: Bvh, n_inner: int, local: tuple[FloatArray, FloatArray, FloatArray]) -> Float32Array:
-    """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates: by row a
-    coordinate of a corner, by lane a triangle. Unused lanes lie far from everything. n_inner: number of inner nodes,
-    which come first in the tree; local: elements (k, 3, 3), origin and 1 / scale (3,)."""
-    child = tree.child[n_inner:]
-    is_item = child != EMPTY
-    block, lane = np.nonzero(is_item)
-    corners = np.full((len(child), CORNER_ROWS, LANES), -UNUSED, np.float32)
-    elements, origin, inverse = local
-    items = -1 - child[is_item]
-    for first in range(0, len(items), _ITEMS):
-        poll()
-        some = slice(first, first + _ITEMS)
-        with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
-            places = elements[items[some]] * inverse - origin * inverse
-        corners[block[some], :, lane[some]] = places.reshape(-1, CORNER_ROWS)
-    return cache_aligned(corners)
+@kernel
+def _move_nodes(
+    boxes: Float32Array, child: Int32Array, first: int, last: int, elements: FloatArray, origin: FloatArray,
+    inverse: FloatArray, place: Int32Array, n_inner: int, moved: Float32Array, children: Int32Array,
+    corners: Float32Array,
+) -> None:  # fmt: skip
+    """Copy nodes first .. last - 1 of a tree to their places (n_nodes,), which become the numbers of children.
+
+    corners (n_blocks, 9, 8): filled for leaf nodes with the corners of their triangles, in tree coordinates: by row a
+    coordinate of a corner, by lane a triangle. Unused lanes lie far from everything."""
+    for node in range(first, last):
+        to = place[node]
+        for lane in range(LANES):
+            for row in range(BOX_ROWS):
+                moved[to, row, lane] = boxes[node, row, lane]
+            entry = child[node, lane]
+            children[to, lane] = place[entry] if entry >= 0 else entry
+            if to < n_inner:
+                continue
+            for row in range(CORNER_ROWS):
+                corner, k = row // 3, row % 3
+                far = -UNUSED
+                if entry != EMPTY:
+                    far = np.float32(elements[-1 - entry, corner, k] * inverse[k] - origin[k] * inverse[k])
+                corners[to - n_inner, row, lane] = far

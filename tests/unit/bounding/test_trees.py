@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
+import numba
 import numpy as np
 import pytest
 
 from engine import Surface
-from engine.bounding import bvh
-from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_balanced_bvh, build_bvh, build_stretched_bvh
+from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh
+from engine.bounding.trees import MANY, build_balanced_bvh, build_bvh, build_stretched_bvh
 from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
-from engine.errors import CancelledError
+from engine.errors import CancelledError, DeadlineExceededError
 from engine.lanes.boxes import EMPTY
 from engine.running.budget import Budget, Cancel
 
@@ -72,17 +75,57 @@ def test_equal_centres_and_geometric_sizes_stay_shallow() -> None:
 
 
 def test_building_looks_at_every_budget_around_it() -> None:
-    boxes, cancel = random_boxes(50_000, 1.0, 0), Cancel()
+    boxes, cancel = random_boxes(1000, 1.0, 0), Cancel()
     cancel.set()
     with Budget(cancel=cancel), Budget(), pytest.raises(CancelledError):
         build_bvh(boxes)
 
 
-def test_a_tree_is_built_in_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    steps: list[None] = []
-    monkeypatch.setattr(bvh, "poll", lambda: steps.append(None))
-    build_bvh(random_boxes(100_000, 1.0, 0))
-    assert len(steps) > 5
+@pytest.mark.parametrize("many", [MANY, 1000])
+def test_building_ends_soon_after_the_deadline(many: int) -> None:
+    boxes = random_boxes(400_000, 1.0, 0)
+    build_bvh(boxes[:2000], many=1000)
+    before = time.thread_time()
+    with Budget(deadline=0.02), pytest.raises(DeadlineExceededError):
+        build_bvh(boxes, many=many)
+    assert time.thread_time() - before < 0.1
+
+
+def nodes_of(tree: Bvh) -> set[tuple[bytes, frozenset[int]]]:
+    """Return the boxes of all nodes, with the items of each block, whatever their order."""
+    return {
+        ((np.sort(boxes, axis=1) + 0.0).tobytes(), frozenset(child[child < 0].tolist() if child[0] < 0 else []))
+        for boxes, child in zip(tree.boxes, tree.child)
+    }
+
+
+def shapes_of_boxes() -> dict[str, np.ndarray]:
+    """Return boxes of which large trees are hard to divide."""
+    spread, low = random_boxes(5000, 1.0, 3), np.random.default_rng(4).uniform(-1, 1, (5000, 3))
+    crowded, alone = spread * 2.0**-40, spread.copy()
+    crowded[:100] = spread[:100]
+    alone[:] = spread[:1]
+    ladder = np.repeat(2.0 ** np.arange(0, 500, 0.1)[:, None], 6, axis=1) * [0, 0, 0, 1, 1, 1]
+    flat = np.concatenate([low, low], axis=1) * [1, 1, 0, 1, 1, 0]
+    return {"spread": spread, "crowded": crowded, "in one place": alone, "ladder": ladder, "flat": flat}
+
+
+@pytest.mark.parametrize("name", shapes_of_boxes())
+def test_a_tree_built_on_threads_has_the_nodes_of_another(name: str) -> None:
+    boxes = shapes_of_boxes()[name]
+    tree, other = build_bvh(boxes, many=500), build_bvh(boxes)
+    check_tree(boxes, tree)
+    if name not in ("in one place", "ladder"):  # case: runs are split in the middle, by order
+        assert nodes_of(tree) == nodes_of(other)
+    assert len(other.parts) == 2 < len(tree.parts)
+    assert numba.typeof(tree) == numba.typeof(other)  # kernels take it, for which they are compiled
+    place, start = tree.parts[0].tolist()
+    assert [start, *tree.parts[-1].tolist()] == [0, len(tree.child), len(boxes)]
+    assert (tree.child[:place] >= 0)[:, 0].all()
+    for (first, item), (last, end) in zip(tree.parts, tree.parts[1:]):
+        own = tree.child[first:last]
+        assert sorted(own[own >= 0].tolist()) == list(range(first + 1, last))  # whole, apart from the others
+        assert ((own < 0) & (own != EMPTY)).sum() == end - item
 
 
 # --- The flat cylinders of a tree hold the faces below their children, and are flat where these are ---
@@ -136,7 +179,7 @@ def test_stretched_trees_have_axes_of_about_one_length(units: list[float]) -> No
     """Powers of two, so that boxes are where they were; every leaf holds its item in the coordinates of its axis."""
     low = np.random.default_rng(2).uniform(-1, 1, (200, 3)) * units
     high = low + 0.01 * np.array(units)
-    tree, origin, scale = build_stretched_bvh(np.concatenate([low, high], axis=1))
+    tree, origin, scale, _ = build_stretched_bvh(np.concatenate([low, high], axis=1))
     assert (np.frexp(scale)[0] == 0.5).all()
     extents = (high.max(axis=0) - low.min(axis=0)) / scale
     assert extents.max() <= 4.0

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.bounding.bvh import build_bvh
+from engine.bounding.trees import build_bvh
 from engine.compiling.jit import kernel
 from engine.lanes.boxes import enter_boxes
 from engine.segment_clipping.on_boundary.descent import local_segment

@@ -38,7 +38,7 @@ def test_triangles_met_are_near(scale: float) -> None:
             free = rng.uniform(-1, 1, (64, 1, 3)) + rng.normal(size=(64, 3, 3)) * size
             offset = rng.choice([0.0, 1e3]) * np.ones(3)
             corners = (np.concatenate([met, free]) + offset) * scale
-            mesh = mesh_of(corners, np.arange(len(corners)))
+            mesh = mesh_of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), np.arange(len(corners)))
             ends = Point3(*((p + offset) * scale)), Point3(*((q + offset) * scale))
             way = local_segment(*ends, mesh.origin, mesh.inverse, 0.0)
             assert way.is_near

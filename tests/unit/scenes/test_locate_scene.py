@@ -281,3 +281,13 @@ def test_polyhedra_have_the_trees_that_are_there() -> None:
             assert tables.kinds.tolist() == [BodyKind.MESH]
             assert bool(tables.addresses.any()) == has_tree
             tree_of(solid)
+
+
+@pytest.mark.parametrize("n_bodies", [300, 40_000, 33_000])
+def test_scenes_of_any_size_in_one_process(n_bodies: int) -> None:
+    """Unit boxes along a line, each flush with the next: a tree of many bodies is built on threads."""
+    boxes = [Aabb([k, 0, 0], [k + 1, 1, 1]) for k in range(n_bodies)]
+    found = engine.Scene(boxes).locate([[7, 0.5, 0.5], [n_bodies - 0.5, 0.5, 0.5], [-1, 0, 0]])
+    assert found.offsets.tolist() == [0, 2, 3, 3]
+    assert found.indices.tolist() == [6, 7, n_bodies - 1]
+    assert found.on_boundary.tolist() == [True, True, False]

@@ -81,7 +81,7 @@ def test_blocks_hold_every_triangle_once_behind_all_inner_nodes() -> None:
     rng = np.random.default_rng(1)
     for n in (1, 8, 9, 500):
         elements = rng.uniform(-1, 1, (n, 3, 3))
-        mesh = mesh_of(elements, np.arange(n))
+        mesh = mesh_of(elements.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3), np.arange(n))
         inner, blocks = mesh.child[: mesh.n_inner], mesh.child[mesh.n_inner :]
         items = blocks[(blocks < 0) & (blocks >= -n)]
         assert sorted(-1 - items) == list(range(n))

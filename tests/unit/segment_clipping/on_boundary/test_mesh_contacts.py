@@ -58,7 +58,9 @@ def test_contacts_are_those_of_all_triangles() -> None:
         assert n_contacts == offsets[-1]
         return met, kinds, offsets
 
-    met, kinds, offsets = found(mesh_of(corners, np.arange(len(corners))))
+    met, kinds, offsets = found(
+        mesh_of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), np.arange(len(corners)))
+    )
     expected: list[set[tuple[int, int]]] = [set() for _ in segments]
     for i, triangle in enumerate(corners):
         for k, segment in enumerate(segments):
