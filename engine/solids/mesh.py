@@ -268,9 +268,10 @@ def _unbalanced_edges(
 
 
 def is_large(first: Solid, second: Solid | None = None) -> bool:
-    """Return whether any of these is a mesh whose trees are built on threads."""
-    is_first = isinstance(first, Mesh) and len(first.triangles) >= MANY
-    return is_first or (isinstance(second, Mesh) and len(second.triangles) >= MANY)
+    """Return whether any of these is a mesh whose trees may be built on threads: of many face corners, which are at
+    hand, unlike its triangles."""
+    is_first = isinstance(first, Mesh) and len(first.face_indices) >= MANY
+    return is_first or (isinstance(second, Mesh) and len(second.face_indices) >= MANY)
 
 
 class Polyhedron(Mesh):
