@@ -40,7 +40,8 @@ class Witness:
     """One reason why two bodies have a common point.
 
     Of bodies that touch it is the strongest contact, of equal ones that of the lowest faces: of all where a plane of a
-    face parts the bodies, else of some 32.
+    face parts the bodies, else of some 32. Where both bodies lie in one plane it is any of their contacts, and may
+    change with the order of the faces.
 
     Attributes
     ----------
