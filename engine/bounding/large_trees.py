@@ -71,6 +71,9 @@ def _size_of(n_items: int) -> int:
 
 def by_range(task: Callable[[int, int], object], n_items: int, seconds: float) -> None:
     """Call ``task(start, stop)`` for ranges of items, on threads where that pays."""
+    if n_items <= _LEAST_RANGE:
+        task(0, n_items)
+        return
     size = _size_of(n_items)
     n_ranges = -(-n_items // size)
     share(lambda first, last: task(first * size, min(last * size, n_items)), n_ranges, seconds * size)

@@ -41,9 +41,9 @@ def build_bvh(boxes: FloatArray, many: int = MANY) -> Bvh:
 
 
 def build_stretched_bvh(boxes: FloatArray, many: int = MANY) -> tuple[Bvh, FloatArray, FloatArray, FloatArray]:
-    """Return (tree, origin, scale, ends): the tree over boxes (n_items, 6), stretched along each
-    axis by a power of two so that float32, and one slack for all axes, resolve what is small on a short axis; by axis x
-    = origin + scale * local, (3,) each; and the box (6,) around all."""
+    """Return (tree, origin, scale, ends): the tree over boxes (n_items, 6), stretched along each axis by a
+    power of two so that float32, and one slack for all axes, resolve what is small on a short axis; by axis x = origin
+    + scale * local, (3,) each; and the box (6,) around all."""
     tree, stretch, ends = _build(boxes, True, many)
     return tree, read_only(tree.origin / stretch), read_only(tree.scale / stretch), ends
 
@@ -61,12 +61,9 @@ def build_balanced_bvh(boxes: FloatArray, many: int = MANY) -> Bvh:
     return Bvh(cache_aligned(narrowed), tree.child, read_only(tree.origin / stretch), tree.scale, tree.parts)
 
 
-def boxes_of(vertices: FloatArray, triangles: IntArray, many: int = MANY) -> FloatArray:
+def boxes_of(vertices: FloatArray, triangles: IntArray) -> FloatArray:
     """Return the boxes (m, 6) of triangles (m, 3), low corner, then high."""
     vertices, triangles, boxes = read_only(vertices), read_only(triangles), np.empty((len(triangles), 6))
-    if len(boxes) < many:
-        _fill_boxes(vertices, triangles, boxes)
-        return boxes
 
     def fill(start: int, stop: int) -> None:
         _fill_boxes(vertices, triangles[start:stop], boxes[start:stop])
@@ -92,7 +89,8 @@ def _build(boxes: FloatArray, is_stretched: bool, many: int) -> tuple[Bvh, Float
     poll()
     origin, nodes = np.empty(3), np.empty((2 * n_items, 6, WIDTH), np.float32)
     child = np.empty((2 * n_items, WIDTH), np.int32)  # untouched rows take no memory
-    scale, n_nodes = _build_small(boxes, is_stretched, stretch, ends, origin, nodes, child)
+    with np.errstate(all="ignore"):  # uncompiled runs only
+        scale, n_nodes = _build_small(boxes, is_stretched, stretch, ends, origin, nodes, child)
     parts = np.array(((0, 0), (n_nodes, n_items)))
     nodes, child = cache_aligned(nodes[:n_nodes]), cache_aligned(child[:n_nodes])
     return Bvh(nodes, child, read_only(origin), scale, parts), stretch, ends

@@ -278,7 +278,7 @@ def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
 def build_tree(solid: Polyhedron, many: int = MANY) -> TriangleTree:
     """Build the `TriangleTree` of a polyhedron, on threads from `many` faces on. Raises: DeadlineExceededError,
     CancelledError."""
-    boxes, triangles = boxes_of(solid.vertices, solid.triangles, many), np.empty((len(solid.triangles), 3), np.int32)
+    boxes, triangles = boxes_of(solid.vertices, solid.triangles), np.empty((len(solid.triangles), 3), np.int32)
     tree, origin, scale, ends = build_stretched_bvh(boxes, many)
     x, y, z, u, v, w = ends.tolist()
     child, blocks = tree.child.copy(), empty_rows((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)

@@ -164,8 +164,8 @@ def poll() -> None:
 
 
 def current() -> Budget:
-    """Return the budget under which this thread works, a new one without."""
-    return getattr(_here, "budget", None) or Budget()
+    """Return the budget under which this thread works, `UNLIMITED` without one."""
+    return getattr(_here, "budget", None) or UNLIMITED
 
 
 def reading(deadline: float | None, cancel: Cancel | None) -> Budget:

@@ -37,7 +37,7 @@ from typing import Final, TypedDict
 import numpy as np
 
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
-from engine.running.budget import Budget, Cancel, current, poll, shown, work_under
+from engine.running.budget import UNLIMITED, Budget, Cancel, current, poll, shown, work_under
 
 Progress = Callable[[int], object]
 """Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""
@@ -219,6 +219,7 @@ def share(task: Callable[[int, int], object], n_items: int, pace: float) -> None
     poll()
     if n_items * pace > CHUNK_SECONDS:
         budget, chunk = current(), max(1, int(CHUNK_SECONDS / pace))
+        budget = Budget() if budget is UNLIMITED else budget  # an error in one thread sets its flag
         run_chunks(task, n_items, budget=budget, first_chunk=chunk, workers=budget.workers, pace=pace)
     elif n_items:
         task(0, n_items)

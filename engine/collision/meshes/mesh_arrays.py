@@ -125,7 +125,7 @@ def mesh_body_of_triangles(
     order of the tree, so that faces near a contact are close in memory; large meshes under many poses depend on it."""
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
-    tree = build_balanced_bvh(boxes_of(vertices, triangles, many), many)
+    tree = build_balanced_bvh(boxes_of(vertices, triangles), many)
     child, order = np.empty_like(tree.child), np.empty(n_triangles, np.int64)
     ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
     number, old = np.full(len(vertices), -1, np.int64), np.empty(len(vertices), np.int64)
@@ -138,7 +138,7 @@ def mesh_body_of_triangles(
         child[:above] = tree.child[:above]
     tree.each(place, _PLACE_SECONDS)
     n_used, n_components, first_face = _number_vertices(ordered, faces, order, number, old, components)
-    used, (reach, lowest_bit, shift) = _taken(vertices, old[:n_used], many)
+    used, (reach, lowest_bit, shift) = _taken(vertices, old[:n_used])
     blocks, discs, sizes = _rows_of(tree, child, used, ordered, axis)
     arrays = MeshArrays(
         read_only(used), read_only(ordered), read_only(axis), np.full(n_triangles, STATE_UNKNOWN, np.int8),
@@ -169,7 +169,7 @@ def _rows_of(
     return blocks, discs, np.max(each, axis=0) if len(each) > 1 else each[0]
 
 
-def _taken(vertices: FloatArray, old: IntArray, many: int) -> tuple[FloatArray, tuple[float, int, int]]:
+def _taken(vertices: FloatArray, old: IntArray) -> tuple[FloatArray, tuple[float, int, int]]:
     """Return the rows `old` of vertices (n, 3), and `_lattice_of` them."""
     used, each = np.empty((len(old), 3)), []
 
@@ -177,10 +177,9 @@ def _taken(vertices: FloatArray, old: IntArray, many: int) -> tuple[FloatArray, 
         np.take(vertices, old[start:stop], axis=0, out=used[start:stop], mode="clip")
         each.append(_lattice_of(used[start:stop]))
 
-    if len(old) < many:
-        take(0, len(old))
-        return used, each[0]
     by_range(take, len(old), _TAKE_SECONDS)
+    if len(each) == 1:
+        return used, each[0]
     reaches, bits, shifts = zip(*([own for own in each if own[0] > 0.0] or each))
     return used, (max(reaches), min(bits), max(shifts))
 

@@ -128,17 +128,14 @@ def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
 def mesh_of(vertices: FloatArray, triangles: IntArray, faces: IntArray, many: int = MANY) -> Mesh:
     """Build the boundary of a mesh from its vertices (n, 3) and triangles (k, 3), on threads from `many` triangles on.
     faces: the caller's number of the face of each."""
-    tree, origin, scale, _ = build_stretched_bvh(boxes_of(vertices, triangles, many), many)
+    tree, origin, scale, _ = build_stretched_bvh(boxes_of(vertices, triangles), many)
     elements, are_safe = empty_rows((len(triangles), 3, 3), np.float64), []
 
     def take(first: int, last: int) -> None:
         np.take(vertices, triangles[first:last], axis=0, out=elements[first:last], mode="clip")
         are_safe.append(are_all_safe(elements[first:last]))
 
-    if len(triangles) < many:
-        take(0, len(triangles))
-    else:
-        by_range(take, len(triangles), _TAKE_SECONDS)
+    by_range(take, len(triangles), _TAKE_SECONDS)
     with np.errstate(over="ignore"):  # of a mesh of denormal size: what is no number separates nothing
         inverse = read_only(1.0 / scale)
     nodes, child, n_inner, corners = _inner_first(tree, (elements, origin, inverse))
@@ -159,7 +156,7 @@ def _inner_first(
     )
     boxes, child = empty_rows(tree.boxes.shape, np.float32), empty_rows(tree.child.shape, np.int32)
     corners = empty_rows((n_blocks, CORNER_ROWS, LANES), np.float32)
-    entry = local[0], *local[1:], place, n_inner, boxes, child, corners
+    entry = *local, place, n_inner, boxes, child, corners
 
     def move(nodes: slice, first: int) -> None:
         _move_nodes(tree.boxes, tree.child, nodes.start, nodes.stop, *entry)
