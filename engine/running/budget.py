@@ -263,6 +263,15 @@ class Budget:
         if self.flag[0]:
             raise CancelledError("another part of the call failed")
 
+    def resume(self) -> None:
+        """Lower the flag that was raised because another part failed, unless the call must end. Caller guarantees that
+        no part runs any more."""
+        self.flag[0] = 0  # order: a clock or switch that raises it from now on stays seen
+        if (self.cancel is not None and self.cancel.is_set) or (
+            self._end is not None and time.monotonic() >= self._end
+        ):
+            self.flag[0] = 1
+
     def _first_to_end(self) -> Budget:
         """Return the budget whose deadline was asked for: that of a call within a call is what was left of it."""
         budget = self

@@ -366,6 +366,7 @@ def _run_threaded(
         with _pool_lock:
             _n_calls -= 1
     if run.failures:
+        budget.resume()  # who handles the error may go on under this budget
         try:
             raise min(run.failures, key=lambda failure: failure[0])[1]
         finally:

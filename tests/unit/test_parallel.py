@@ -225,6 +225,27 @@ def test_the_error_that_raised_the_flag_reaches_the_caller() -> None:
         run_chunks(task, 3, budget=budget, first_chunk=1, workers=2)
 
 
+@pytest.mark.parametrize("is_cancelled", [False, True])
+def test_the_budget_of_a_call_outlives_an_error_in_a_thread(is_cancelled: bool) -> None:
+    """Who handles the error goes on under the same budget: it has neither been cancelled nor passed its deadline."""
+    cancel = Cancel()
+
+    def task(start: int, _stop: int) -> None:
+        if is_cancelled:
+            cancel.set()
+        raise ValueError(start)
+
+    with Budget(60.0, cancel) as budget:
+        with pytest.raises(ValueError, match="0"):
+            run_chunks(task, 100, budget=budget, first_chunk=1, workers=4, pace=0.001)
+        assert budget.flag[0] == is_cancelled
+        if is_cancelled:
+            with pytest.raises(CancelledError):
+                budget.check()
+        else:
+            budget.check()
+
+
 def test_an_error_leaves_nothing_that_only_a_search_for_cycles_finds() -> None:
     held = np.zeros(1)
     gone = weakref.ref(held)

@@ -108,5 +108,9 @@ def test_the_first_of_the_points_that_are_not_finite_is_named(bad: float, worker
     points[41_234, 2] = points[55_555] = bad
     with pytest.raises(NotFiniteError, match=r"points\[41234\]\[2\]"):
         locate(points, solid, workers=workers)
+    many = np.tile(points, (20, 1))  # on threads, whatever the machine
+    for limits in ({}, {"deadline": 60.0}):
+        with pytest.raises(NotFiniteError, match=r"points\[41234\]\[2\]"):
+            locate(many, solid, workers=workers, **limits)
     far = np.array([[1e308, -1e308, 1e308], [0.5, 0.5, 0.5]] * 300)  # finite, though their sum is not
     assert locate(far, solid).tolist() == [-1, 1] * 300
