@@ -236,7 +236,7 @@ def test_the_budget_of_a_call_outlives_an_error_in_a_thread(is_cancelled: bool) 
         raise ValueError(start)
 
     with Budget(60.0, cancel) as budget:
-        with pytest.raises(ValueError, match="0"):
+        with pytest.raises(ValueError, match=r"^\d+$"):  # whichever failed before the flag was up
             run_chunks(task, 100, budget=budget, first_chunk=1, workers=4, pace=0.001)
         assert budget.flag[0] == is_cancelled
         if is_cancelled:
