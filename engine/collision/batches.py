@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.aabb import place_boxes
-from engine.collision.codes import UNSETTLED
+from engine.collision.codes import OVERLAPPING, UNSETTLED
 from engine.collision.collide import (
     TAKEN,
     Witnesses,
@@ -29,7 +29,17 @@ from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline import witness_of
 from engine.collision.outline_batch import outline_pool, relate_outline_pairs
-from engine.collision.simple.form_relations import relate_box_pairs
+from engine.collision.simple.closed_forms import witness_of_forms
+from engine.collision.simple.form_relations import (
+    HIGH,
+    IS_BALL,
+    N_NUMBERS,
+    RADIUS,
+    RELATION_MASK,
+    FormRows,
+    relate_box_pairs,
+    relate_form_pairs,
+)
 from engine.compiling.jit import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.running.budget import Budget, polled
@@ -42,7 +52,7 @@ from engine.solids.poses import Poses
 from engine.solids.primitives import Aabb, Sphere
 from engine.solids.registry import own_box
 from engine.solids.shapes import as_solid
-from engine.types import BoolArray, FloatArray, Int8Array, IntArray
+from engine.types import BoolArray, FloatArray, Int8Array, IntArray, read_only
 
 _LEAST_POSES: Final = 32
 """Smallest number of poses for which a batch saves more time than its preparation takes."""
@@ -56,12 +66,13 @@ class PairBatches:
     """Batch kernels for pairs of bodies, each one of the solids `distinct` (all of one dimension) under a pose; the
     arrays that they read are built at first use."""
 
-    def __init__(self, distinct: Sequence[Solid]) -> None:
-        self.distinct, self.is_planar = distinct, len(distinct) > 0 and distinct[0].dimension == 2
+    def __init__(self, distinct: Sequence[Solid], own: OwnBoxes) -> None:
+        self.distinct, self._own, self.is_planar = distinct, own, len(distinct) > 0 and distinct[0].dimension == 2
         self.are_boxes, self.are_balls = (
             np.array([isinstance(solid, kind) for solid in distinct], np.bool_) for kind in (Aabb, Sphere)
         )
         self.cached_pool: tuple[Any, IntArray] | None = None
+        self._forms: FloatArray | None = None
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
         """Return (pool, places): the solids of `distinct` that the batch kernels take, in one set of arrays, and by
@@ -72,31 +83,63 @@ class PairBatches:
         return self.cached_pool
 
     def task(
-        self, kinds: IntArray, poses: PoseArrays, pairs: IntArray, relations: Int8Array, boolean: bool, detail: bool,
-        budget: Budget, witnesses: Witnesses | None = None,
+        self, kinds: IntArray, poses: PoseArrays, is_posed: BoolArray, pairs: IntArray, relations: Int8Array,
+        boolean: bool, detail: bool, budget: Budget, witnesses: Witnesses | None = None,
     ) -> Callable[[int, int], None]:  # fmt: skip
         """Return a function (start, stop) that fills the UNSETTLED entries of relations[start:stop] with relation codes
-        of pairs[start:stop]; they stay UNSETTLED where the kernel cannot decide. A row is a solid under a pose: kinds
-        (n_rows,), its index in `distinct`; poses, one a row, row 0 the identity. pairs (n, 2): two rows each. boolean:
-        another relation may be given than that of two bodies that meet. detail: an overlap that is not proven to be PO
-        stays UNSETTLED. witnesses (n): in the plane, filled too."""
-        (pool, places), flag = self.pool(budget), budget.flag
-        bodies = places[kinds]
-        contacts = np.full((len(pairs) if self.is_planar and witnesses is not None else 0, 3), -1, np.int32)
+        of pairs[start:stop]; they stay UNSETTLED where no kernel can decide. A row is a solid under a pose: kinds
+        (n_rows,), its index in `distinct`; poses, one a row, row 0 the identity; is_posed (n_rows,), False for none.
+        pairs (n, 2): two rows each. boolean: another relation may be given than that of two bodies that meet. detail:
+        an overlap that is not proven to be PO stays UNSETTLED. witnesses (n): in the plane, and of boxes and balls,
+        filled too."""
+        (pool, places), flag, is_named = self.pool(budget), budget.flag, witnesses is not None
+        bodies, has_forms = places[kinds], bool(self.are_boxes.any() or self.are_balls.any())
+        rows = FormRows(self.forms(), kinds, poses.rotations, poses.translations, is_posed)
+        contacts = np.full((len(pairs) if self.is_planar and is_named else 0, 3), -1, np.int32)
+
+        def relate_forms(start: int, stop: int, with_balls: bool) -> None:
+            if not has_forms:
+                return
+            codes, some = np.empty(stop - start, np.int32), relations[start:stop]
+            entry_of(relate_form_pairs)(rows, pairs[start:stop], some, is_named, with_balls, codes, flag)
+            budget.check()
+            if detail:
+                codes[codes & RELATION_MASK == OVERLAPPING] = UNSETTLED
+            decided = codes != UNSETTLED
+            some[decided] = codes[decided] & RELATION_MASK
+            if witnesses is not None and decided.any():
+                witnesses[start:stop] = map(witness_of_forms, codes.tolist())
 
         def task(start: int, stop: int) -> None:
+            relate_forms(start, stop, self.is_planar or is_named)
             some, codes = pairs[start:stop], relations[start:stop]
             if not self.is_planar:
                 entry_of(relate_convex_pairs)(pool, bodies, poses, some, boolean, not detail, codes, flag)
-                return budget.check()
+                budget.check()
+                if not is_named:  # balls that touch: others are decided sooner by floats
+                    relate_forms(start, stop, True)
+                return
             met = contacts[start:stop]
             entry_of(relate_outline_pairs)(pool, bodies, poses, some, boolean, detail, codes, met, flag)
+            budget.check()
             if witnesses is not None:
-                named = zip(codes.tolist(), *met.T.tolist())
-                witnesses[start:stop] = [witness_of(*row) if row[3] >= 0 else None for row in named]
-            return budget.check()
+                items = np.flatnonzero(met[:, 2] >= 0)
+                for item, *named in zip(items.tolist(), codes[items].tolist(), *met[items].T.tolist()):
+                    witnesses[start + item] = witness_of(*named)
 
         return task
+
+    def forms(self) -> FloatArray:
+        """Return the numbers (n, N_NUMBERS) of the boxes and balls among the solids, see `form_relations.py`; NaN for
+        others and flat boxes. Cached."""
+        if self._forms is None:
+            (low, high), d = np.moveaxis(self._own.boxes, 1, 0), self._own.boxes.shape[2]
+            forms = np.zeros((len(low), N_NUMBERS))
+            forms[:, :d], forms[:, HIGH : HIGH + d], forms[:, RADIUS] = low, high, self._own.radii
+            forms[:, IS_BALL] = self.are_balls
+            forms[~self.are_balls & ~(self.are_boxes & (low < high).all(axis=1))] = np.nan
+            self._forms = read_only(forms)
+        return self._forms
 
 
 def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray]:
@@ -118,7 +161,7 @@ class SceneBatches:
     __slots__ = ("_is_box", "bodies", "pairs")
 
     def __init__(self, bodies: SceneBodies, pairs: PairBatches | None = None) -> None:
-        self.bodies, self.pairs = bodies, PairBatches(bodies.distinct) if pairs is None else pairs
+        self.bodies, self.pairs = bodies, PairBatches(bodies.distinct, bodies.own) if pairs is None else pairs
         self._is_box = self.pairs.are_boxes[bodies.kinds] & ~bodies.is_posed
 
     def under(self, names: IntArray, poses: list[Pose | None]) -> SceneBatches:
@@ -140,10 +183,12 @@ class SceneBatches:
         def relate_boxes(start: int, stop: int) -> None:
             relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs[start:stop], result[start:stop])
 
-        run_chunks(relate_boxes, len(pairs), budget=budget, workers=workers)
+        if witnesses is None:
+            run_chunks(relate_boxes, len(pairs), budget=budget, workers=workers)
         if (result == UNSETTLED).any():
             kinds, poses = np.append(np.int64(0), bodies.kinds), PoseArrays(bodies.rotations, bodies.translations, True)
-            task = self.pairs.task(kinds, poses, pairs + 1, result, boolean, detail, budget, witnesses)
+            is_posed = np.append(False, bodies.is_posed)
+            task = self.pairs.task(kinds, poses, is_posed, pairs + 1, result, boolean, detail, budget, witnesses)
             run_chunks(task, len(pairs), budget=budget, workers=workers)
         return result
 
@@ -156,7 +201,8 @@ class SceneBatches:
         relations = np.full(n, UNSETTLED, np.int8)
         if n and (self.pairs.cached_pool is not None or len(self.bodies.distinct) <= _FEW):
             pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)
-            self.pairs.task(kinds[: 2 * n + 1], poses, pairs, relations, boolean, False, budget)(0, n)
+            is_posed = np.zeros(2 * n + 1, np.bool_)  # only for witnesses
+            self.pairs.task(kinds[: 2 * n + 1], poses, is_posed, pairs, relations, boolean, False, budget)(0, n)
         return relations
 
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
@@ -175,13 +221,14 @@ def posed_batch(
     """Return a task that fills relations[start:stop] for these poses of the second solid, the first unposed; UNSETTLED
     where the kernel cannot decide. None if a batch would be no faster, or a solid of space is not provably convex.
     boolean, detail, witnesses: as in `PairBatches.task`."""
-    n, table = len(relations), PairBatches([first, second])
-    if n < _LEAST_POSES or (not table.is_planar and None in (convex_body_of(first), convex_body_of(second))):
+    n, solids = len(relations), [first, second]
+    if n < _LEAST_POSES or (first.dimension == 3 and None in map(convex_body_of, solids)):
         return None
+    table = PairBatches(solids, _own_boxes(solids))
     turn, move = motions_of([None], first.dimension)
     rows = PoseArrays(np.concatenate([turn, poses.rotations]), np.concatenate([move, poses.translations]), True)
     kinds, pairs = np.minimum(np.arange(n + 1), 1), np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
-    return table.task(kinds, rows, pairs, relations, boolean, detail, budget, witnesses)
+    return table.task(kinds, rows, np.arange(n + 1) > 0, pairs, relations, boolean, detail, budget, witnesses)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -256,6 +303,11 @@ def bodies_of(
 ) -> SceneBodies:  # fmt: skip
     """Return bodies of any type as arrays. solids, poses: of each body; distinct: each solid object once; kinds: index
     in `distinct` of each body's solid; check: called while another thread computes a box, may raise."""
+    return _place_bodies(solids, poses, distinct, kinds, _own_boxes(distinct, check))
+
+
+def _own_boxes(distinct: Sequence[Solid], check: Callable[[], object] | None = None) -> OwnBoxes:
+    """Return the boxes of solids of one dimension. check: as in `bodies_of`."""
     d, is_small = (distinct[0].dimension if distinct else 3), [_is_small(solid) for solid in distinct]
     boxes, reaches = np.empty((len(distinct), 2, d)), np.empty(len(distinct))
     if d == 2 and any(is_small):
@@ -265,7 +317,7 @@ def bodies_of(
         own = [own_box(distinct[k], check) for k in others.tolist()]
         boxes[others], reaches[others] = np.array([box[:2] for box in own]), [box[2] for box in own]
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
-    return _place_bodies(solids, poses, distinct, kinds, OwnBoxes(boxes, reaches, radii))
+    return OwnBoxes(boxes, reaches, radii)
 
 
 def _is_small(solid: Solid) -> bool:

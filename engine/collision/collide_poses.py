@@ -241,16 +241,18 @@ def batch_of(
     pose of the second solid; UNSETTLED where they cannot decide. None if no kernel takes the pair. own: as many poses
     of the first; then the batch of convex bodies is left out, which the caller asked."""
     types = {first.type, second.type}
-    if types in _BALL_AND_MESH or (own is not None and types == {"sphere", "aabb"}):
-        return _ball_batch(first, second, poses, answers, own)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
-    is_named = witnesses is not None  # then a search for contacts follows, which decides all relations
+    is_named = witnesses is not None  # then a search for contacts follows where both have faces, which decides all
+    is_posed_box = types == {"sphere", "aabb"} and (own is not None or (is_named and second.type == "aabb"))
+    if types in _BALL_AND_MESH or (is_posed_box and first.dimension == 3):
+        return _ball_batch(first, second, poses, answers, own)
     has_detail = answers.details is not None
-    is_coarse = answers.boolean or (is_named and first.dimension == 3)
+    have_faces = first.dimension == 3 and has_faces(first) and has_faces(second)
+    is_coarse = answers.boolean or (is_named and have_faces)
     batch = None
     if own is None:
         batch = posed_batch(first, second, poses, relations, is_coarse, has_detail, budget, witnesses)
-    if first.dimension == 2 or not (has_faces(first) and has_faces(second)):
+    if not have_faces:
         return batch
     a, b = mesh_body_of(first), mesh_body_of(second)
     seek = search_goal(a, b, Work(budget, is_named, answers.boolean))
@@ -260,9 +262,7 @@ def batch_of(
     def fill(start: int, stop: int) -> None:
         if batch is not None:
             batch(start, stop)
-        items: IntArray | slice = slice(start, stop)
-        if batch is not None:  # disjoint pairs are decided, and without witnesses more
-            items = start + np.flatnonzero(relations[items] != DISJOINT if is_named else relations[items] == UNSETTLED)
+        items: IntArray | slice = slice(start, stop) if batch is None else answers.left(start, stop)
         some, still = poses_at(poses, items), STILL if own is None else poses_at(own, items)
         rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)
         if not len(rows):

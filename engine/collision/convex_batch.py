@@ -10,7 +10,7 @@ from __future__ import annotations
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.convex_body import ConvexArrays, point_of
 from engine.collision.convex_pair import PlacedBody, placed_body, relate_convex
-from engine.collision.meshes.placement import PoseArrays, is_lattice_rotation, placed, rotate
+from engine.collision.meshes.placement import PoseArrays, has_equal_pose, is_lattice_rotation, placed, rotate
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.predicates.error_free import two_sum
 from engine.predicates.orientation import orient3d
@@ -93,16 +93,6 @@ def _relation_at_vertex(pool: ConvexArrays, first: int, second: int, a: PlacedBo
     return UNSETTLED
 
 
-@merged
-def _has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
-    """Return whether poses i and j are equal; the relation is then that of the two unposed bodies."""
-    for k in range(3):
-        for m in range(3):
-            if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
-                return False
-    return True
-
-
 @kernel
 def relate_convex_pairs(
     pool: ConvexArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, is_boolean: bool, may_be_equal: bool,
@@ -119,7 +109,7 @@ def relate_convex_pairs(
         first, second = bodies[i], bodies[j]
         if relations[item] != UNSETTLED or first < 0 or second < 0:
             continue
-        if _has_equal_pose(poses.rotations, poses.translations, i, j):
+        if has_equal_pose(poses.rotations, poses.translations, i, j):
             i = j = 0
             if first == second and may_be_equal:
                 relations[item] = OVERLAPPING

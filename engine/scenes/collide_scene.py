@@ -20,7 +20,6 @@ from engine.collision.collide import NO_DETAIL, Answers, accuracy_of, check_has_
 from engine.collision.convex_body import pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Witness, Work
-from engine.collision.simple.form_relations import HIGH, IS_BALL, N_NUMBERS, RADIUS
 from engine.compiling.jit import entry_of
 from engine.distance.clearance import checked_distance, has_plane
 from engine.distance.convex_gaps import gaps_of_pairs
@@ -353,11 +352,7 @@ def distances_below(
     kinds = bodies.kinds[pairs]
     turns, moves = bodies.rotations, bodies.translations
     places[of_one_pose(bodies, pairs)] = 0  # left out, as by `collide`
-    low, high = np.moveaxis(bodies.own.boxes, 1, 0)
-    forms, d, balls = np.zeros((len(bodies.distinct), N_NUMBERS)), bodies.dimension, batches.pairs.are_balls
-    forms[:, :d], forms[:, HIGH : HIGH + d], forms[:, RADIUS] = low, high, bodies.own.radii
-    forms[:, IS_BALL] = balls
-    forms[~balls & ~(batches.pairs.are_boxes & (low < high).all(axis=1))] = np.nan
+    forms = batches.pairs.forms()
     pool, convex = _NONE, np.full(len(forms), -1, np.int64)
     if bodies.dimension == 3 and (bodies.is_posed[pairs].any() or np.isnan(forms[kinds, 0]).any()):
         pool, convex = batches.pairs.pool(budget)

@@ -18,7 +18,6 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, details_where_proven
 from engine.collision.collide_poses import batch_of
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.simple.closed_forms import FORMS
 from engine.running.parallel import Progress, run_chunks
 from engine.types import BoolArray, IntArray
 
@@ -79,16 +78,18 @@ def settle_pairs(
 
 def _keys_of(bodies: SceneBodies, pairs: IntArray, answers: Answers) -> IntArray:
     """Return a number for each pair (n, 2), equal for pairs that one kernel call may relate: of the same two solids,
-    each posed in both or in neither; one of its own for a pair under equal poses, and where no kernel helps."""
+    each posed in both or in neither; one of its own for a pair under equal poses, and where no kernel helps. A ball
+    before a posed box has a witness on a face, which a kernel for many finds."""
     if bodies.dimension == 2:
         return np.arange(len(pairs))
     (i, j), n, turns = pairs.T, len(bodies.distinct), bodies.rotations[1:]
     is_moved = _are_any(turns != np.eye(3)) | _are_any(bodies.translations[1:] != 0.0)
     keys: IntArray = 4 * (bodies.kinds[i] * n + bodies.kinds[j]) + 2 * is_moved[i] + is_moved[j]
-    is_box, is_form = (np.array([solid.type in types for solid in bodies.distinct]) for types in (("aabb",), FORMS))
-    is_turned = is_box[bodies.kinds] & _are_any(turns != np.rint(turns))
-    has_form = is_form[bodies.kinds] & ~is_turned  # such pairs are decided by that, alone
-    alone = np.concatenate([of_one_pose(bodies, pairs), np.flatnonzero(has_form[i] & has_form[j])])
+    types = np.array([solid.type for solid in bodies.distinct])[bodies.kinds]
+    is_ball, is_box = types == "sphere", types == "aabb"
+    is_plain = is_ball | (is_box & ~_are_any(turns != np.rint(turns)))  # decided by that, alone
+    has_faces = (is_ball[i] & is_box[j] & bodies.is_posed[j]) | (is_box[i] & bodies.is_posed[i] & is_ball[j])
+    alone = np.concatenate([of_one_pose(bodies, pairs), np.flatnonzero(is_plain[i] & is_plain[j] & ~has_faces)])
     keys[alone] = 4 * n * n + alone
     return keys
 

@@ -82,6 +82,17 @@ def is_lattice_rotation(rotation: FloatArray) -> bool:
     return True
 
 
+@merged
+def has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
+    """Return whether poses i and j are equal; the relation is then that of the two unposed bodies."""
+    d = translations.shape[1]
+    for k in range(d):
+        for m in range(d):
+            if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
+                return False
+    return True
+
+
 @inline
 def _largest_power_of_two(value: float) -> float:
     """Return the largest power of two that divides a nonzero number."""

@@ -26,6 +26,7 @@ from engine.collision.meshes.parity import state_at
 from engine.collision.simple import form_relations as relations
 from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.boundary import Boundary, boundary_of, first_triangle_at, pulled_back
+from engine.collision.simple.form_relations import RELATION_MASK
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.predicates.rational import largest_axis, minus, sign_of, squared_length
 from engine.predicates.vectors import as_point3, dot
@@ -87,24 +88,30 @@ def relation_closed_form(
     if code == UNSETTLED:
         return None
     if not work.witness:
-        return result.UNNAMED[code & _RELATION]
+        return result.UNNAMED[code & RELATION_MASK]
     if second.type == "aabb":
         return None if d == 2 and code >= OVERLAPPING else _named(code)
     is_turned = first.type == "aabb" and motion is not motion_of(None, d)  # its faces may count
     return None if is_turned and code >= OVERLAPPING else _BY_BALL[code]
 
 
-_RELATION = (1 << relations.KIND_AT) - 1
 _BY_BALL = result.NO_CONTACT, result.FIRST_WITHIN, result.SECOND_WITHIN, result.OVERLAP, result.TOUCH
 
 
 @lru_cache(4096)
+def witness_of_forms(code: int) -> result.Witness | None:
+    """Return the witness encoded in a code of `relate_form_pairs`; None if UNSETTLED or disjoint."""
+    return None if code == UNSETTLED else _named(code).witness
+
+
+@lru_cache(4096)
 def _named(code: int) -> result.Collision:
-    """Return the answer, with its witness, encoded in the code that `relate_forms` returns for two boxes."""
-    relation, kind = code & _RELATION, code >> relations.KIND_AT & _RELATION
-    if relation < OVERLAPPING:
+    """Return the answer, with its witness, encoded in the code that `relate_forms` returns for two boxes, or
+    `relate_form_pairs`."""
+    relation, kind = code & RELATION_MASK, code >> relations.KIND_AT & RELATION_MASK
+    if relation < OVERLAPPING or code & relations.OF_BALL:
         return _BY_BALL[relation]
-    faces = code >> relations.FACE_AT & _RELATION, code >> relations.THEIR_FACE_AT
+    faces = code >> relations.FACE_AT & RELATION_MASK, code >> relations.THEIR_FACE_AT & RELATION_MASK
     return result.Collision(Relation(relation), result.Witness(STRENGTH[kind], *faces))
 
 

@@ -8,15 +8,17 @@ Their squared distances are compared with the sum and difference of radii, squar
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
+from engine.collision.meshes.placement import has_equal_pose
 from engine.compiling.jit import called, inline, kernel
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import add, add_product, grow, grow_product, is_safe, sign
 from engine.predicates.vectors import as_point3, cross, dot, minus
-from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Point3
+from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point3
 
 HIGH: Final = 3
 RADIUS: Final = 6
@@ -26,7 +28,10 @@ N_NUMBERS: Final = 8
 KIND_AT: Final = 3
 FACE_AT: Final = 6
 THEIR_FACE_AT: Final = 9
-"""Bit positions in a code, above the relation, of the kind of contact and of the faces of two boxes."""
+OF_BALL: Final = 1 << 12
+RELATION_MASK: Final = (1 << KIND_AT) - 1
+"""Bit positions in a code, above the relation, of the kind of contact and of the faces of two boxes. OF_BALL is set in
+codes of `relate_form_pairs` where one of the two is a ball."""
 _LARGEST: Final = 2.0**1022
 _N_PAIRS: Final = 24
 _N_RANKS: Final = 12
@@ -34,6 +39,13 @@ _THEIRS: Final = 6
 """Ranks of bounds: low and high of the first body on three axes each, then of the second."""
 _N_COORDINATE: Final = 32  # 2 components for each of 3 products of either body, two translations, a radius
 _N_TOTAL: Final = 1100  # as in `posed.py`
+_POLL_EVERY: Final = 256
+
+
+FormRows = namedtuple("FormRows", "forms kinds turns moves is_posed")
+"""Bodies under poses, one a row; row 0 is under none. forms (n_solids, N_NUMBERS): of each solid, NaN if it is neither
+ball nor box, or a flat one; kinds (n_rows,): index of the solid; turns (n_rows, d, d), moves (n_rows, d); is_posed
+(n_rows,): False where no pose was given."""
 
 
 class Placed(NamedTuple):
@@ -229,11 +241,10 @@ def _has_separating_axis(a: Placed, b: Placed) -> bool:
 
 @inline
 def _relate_boxes(a: Placed, b: Placed) -> int:
-    """Return the code (`relate_forms`) of two posed boxes; if a pose mixes axes, DISJOINT by a separating axis, or
-    UNSETTLED."""
+    """Return the code (`relate_forms`) of two posed boxes; UNSETTLED if a pose mixes axes."""
     w, ranks, d = workspace(_N_PAIRS), workspace(_N_RANKS), a.turn.shape[0]
     if not (_place(a, w, 0) and _place(b, w, 12)):
-        return DISJOINT if d == 3 and _has_separating_axis(a, b) else UNSETTLED
+        return UNSETTLED
     _rank(w, d, ranks)
     relation = _relate(ranks[:d], ranks[3 : 3 + d], ranks[_THEIRS : _THEIRS + d], ranks[_THEIRS + 3 : _THEIRS + 3 + d])
     if d == 2 or relation < OVERLAPPING:
@@ -343,4 +354,43 @@ def relate_forms(
     relation, or UNSETTLED if undecided. For two intersecting boxes of space also the kind of contact << KIND_AT and the
     faces << FACE_AT, << THEIR_FACE_AT."""
     a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)
-    return _relate_boxes(a, b) if other[IS_BALL] == 0.0 else _relate_to_ball(a, b)
+    if other[IS_BALL] != 0.0:
+        return _relate_to_ball(a, b)
+    code = _relate_boxes(a, b)
+    return DISJOINT if code == UNSETTLED and turn.shape[0] == 3 and _has_separating_axis(a, b) else code
+
+
+@kernel
+def relate_form_pairs(
+    table: FormRows, pairs: IntArray, relations: Int8Array, is_named: bool, with_balls: bool, codes: Int32Array,
+    flag: FlagArray,
+) -> None:  # fmt: skip
+    """Write the codes (n,) int32 of those pairs (n, 2) of rows whose relations (n,) are UNSETTLED, exact; UNSETTLED
+    where one of the two is neither box nor ball or `relate_forms` decides nothing. Equal poses count as none.
+
+    is_named: also where a witness would need the edges of a box, in the plane, or the face of a posed box before a
+    ball. with_balls: also pairs with a ball. Returns early when the flag is set."""
+    forms, kinds, turns, moves, is_posed = table
+    d = moves.shape[1]
+    for item in range(pairs.shape[0]):
+        i, j = pairs[item, 0], pairs[item, 1]
+        first, second = kinds[i], kinds[j]
+        codes[item] = UNSETTLED
+        if item % _POLL_EVERY == 0 and flag[0] != 0:
+            return
+        n_balls = forms[first, IS_BALL] + forms[second, IS_BALL]  # NaN if one is neither
+        if relations[item] != UNSETTLED or not 0.0 <= n_balls <= (2.0 if with_balls else 0.0):
+            continue
+        is_swapped = n_balls == 1.0 and forms[first, IS_BALL] == 1.0  # the box comes first
+        if is_swapped:
+            i, j, first, second = j, i, second, first
+        are_boxes = n_balls == 0.0
+        if is_named and ((d == 2 and are_boxes) or (n_balls == 1.0 and is_posed[i])):
+            continue
+        if has_equal_pose(turns, moves, i, j):
+            i = j = 0
+        a, b = Placed(forms[first], turns[i], moves[i]), Placed(forms[second], turns[j], moves[j])
+        code = _relate_boxes(a, b) if are_boxes else _relate_to_ball(a, b)
+        if is_swapped and FIRST_INSIDE_SECOND <= code <= SECOND_INSIDE_FIRST:
+            code = FIRST_INSIDE_SECOND + SECOND_INSIDE_FIRST - code
+        codes[item] = code | OF_BALL if n_balls > 0.0 and code != UNSETTLED else code

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine import Aabb, Pose, Relation, Sphere, collide
+from engine import Aabb, Pose, Relation, Sphere, collide, collide_poses, collide_scene
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import mesh_body_of
@@ -152,3 +152,66 @@ def test_agrees_with_single_pairs_flat_ones_too(d: int) -> None:
     for (i, j), how in zip(pairs.tolist(), found.tolist()):
         expected = collide(Aabb(low[i], high[i]), Aabb(low[j], high[j])).relation
         assert how == (UNSETTLED if 7 in (i, j) else expected)
+
+
+def _forms_and_poses(d: int, draw: np.random.Generator) -> tuple[list[Solid], list[Pose | None]]:
+    """Return boxes, some flat, and balls, some points, on a lattice, under lattice and free poses and none."""
+    bodies: list[Solid] = []
+    for k in range(6):
+        low = draw.integers(-2, 3, d) / 2
+        size = draw.integers(0 if k == 0 else 1, 4, d) / 2
+        bodies.append(Aabb(low, low + size) if k % 2 == 0 else Sphere(low, 0.0 if k == 1 else float(size[0])))
+    turns = [np.eye(d), np.array(TURNS[5]) if d == 3 else np.array([[0.0, -1.0], [1.0, 0.0]])]
+    free = np.eye(d)
+    free[:2, :2] = [[0.6, -0.8], [0.8, 0.6]]
+    poses = [
+        None if draw.random() < 0.3 else Pose([*turns, free][draw.integers(3)], draw.integers(-3, 4, d) / 2)
+        for _ in range(70)
+    ]
+    return [bodies[k] for k in draw.integers(0, len(bodies), len(poses))], poses
+
+
+@pytest.mark.parametrize("detail", [False, True])
+@pytest.mark.parametrize(("d", "seed"), [(2, 0), (2, 1), (3, 0), (3, 1)])
+def test_scenes_of_boxes_and_balls_are_answered_as_pair_by_pair(d: int, seed: int, detail: bool) -> None:
+    bodies, poses = _forms_and_poses(d, np.random.default_rng([d, seed]))
+    poses[1] = poses[0]
+    pairs = collide_scene(bodies, poses, witnesses=True, detail=detail)
+    assert len(pairs) > 250
+    without = collide_scene(bodies, poses, detail=detail)
+    assert without.relation.tolist() == pairs.relation.tolist()
+    kinds = set()
+    for (i, j, how), witness in zip(pairs, pairs.witnesses or ()):
+        alone = collide(bodies[i], bodies[j], first_pose=poses[i], second_pose=poses[j], detail=detail)
+        assert how == alone.relation
+        if not detail or how != Relation.OVERLAPPING:  # then it may be any crossing
+            assert witness == alone.witness
+        kinds.add((bodies[i].type, bodies[j].type, how))
+    assert np.array_equal(np.array(pairs.detail), np.array(without.detail))
+    assert len(kinds) >= 8
+
+
+@pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 0), (0, 0), (1, 1)])
+@pytest.mark.parametrize("d", [2, 3])
+def test_witnesses_do_not_change_the_detail_of_many_poses(d: int, first: int, second: int) -> None:
+    """A ball within a box was told to overlap it partly where witnesses were asked for as well."""
+    draw = np.random.default_rng(5)
+    solids: list[Solid] = [Aabb([-0.5] * d, [1.0] * (d - 1) + [1.5]), Sphere([0.5] + [0.0] * (d - 1), 0.5)]
+    turns = np.broadcast_to(np.eye(d), (200, d, d))
+    moves = draw.integers(-4, 5, (200, d)) / 4
+    codes, _, details = collide_poses(solids[first], solids[second], turns, moves, witnesses=True, detail=True)
+    told = [
+        collide(solids[first], solids[second], second_pose=Pose(turns[k], moves[k]), detail=True) for k in range(200)
+    ]
+    assert codes.tolist() == [answer.relation for answer in told]
+    assert details.tolist() == [answer.detail for answer in told]
+    assert len(set(details.tolist())) >= 2
+
+
+def test_forms_beyond_expansions_are_left_open() -> None:
+    far = [Sphere([2.0**600 * k, 0.0, 0.0], 2.0**599) for k in range(3)]
+    pairs = collide_scene(far * 4, witnesses=True)
+    for (i, j, how), witness in zip(pairs, pairs.witnesses or ()):
+        alone = collide((far * 4)[i], (far * 4)[j])
+        assert (how, witness) == (alone.relation, alone.witness)
+    assert set(pairs.relation.tolist()) == {Relation.OVERLAPPING, Relation.TOUCHING}
