@@ -29,7 +29,8 @@ from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline import witness_of
 from engine.collision.outline_batch import outline_pool, relate_outline_pairs
-from engine.collision.simple.closed_forms import witness_of_forms
+from engine.collision.result import has_faces
+from engine.collision.simple.closed_forms import FORMS, witness_of_forms
 from engine.collision.simple.form_relations import (
     HIGH,
     IS_BALL,
@@ -219,10 +220,13 @@ def posed_batch(
     witnesses: Witnesses | None,
 ) -> Callable[[int, int], None] | None:  # fmt: skip
     """Return a task that fills relations[start:stop] for these poses of the second solid, the first unposed; UNSETTLED
-    where the kernel cannot decide. None if a batch would be no faster, or a solid of space is not provably convex.
-    boolean, detail, witnesses: as in `PairBatches.task`."""
-    n, solids = len(relations), [first, second]
-    if n < _LEAST_POSES or (first.dimension == 3 and None in map(convex_body_of, solids)):
+    where the kernel cannot decide. None if a batch would be no faster, if a solid of space is not provably convex, or
+    one of the plane has no edges, unless the two are boxes and discs. boolean, detail, witnesses: as in
+    `PairBatches.task`."""
+    n, solids, are_planar = len(relations), [first, second], first.dimension == 2
+    if n < _LEAST_POSES or not (are_planar or all(map(convex_body_of, solids))):
+        return None
+    if are_planar and not (all(map(has_faces, solids)) or {first.type, second.type} <= {*FORMS}):
         return None
     table = PairBatches(solids, _own_boxes(solids))
     turn, move = motions_of([None], first.dimension)

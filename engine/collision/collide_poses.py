@@ -157,6 +157,8 @@ def collide_poses(
         witness_list: one_pair.Witnesses | None = [None] * n_poses if witnesses else None
         answers = one_pair.Answers(budget, bool(boolean), relations, witness_list, details if has_detail else None)
         fill = batch_of(first, second, poses, answers)
+        if fill is None and not is_large(first, second):
+            workers = 1  # each pose is Python code, which two threads run slower than one
 
         def pair_of(item: int) -> one_pair.PlacedPair:
             return first, second, (None, Pose.of_checked(poses.rotations[item], poses.translations[item]))
@@ -246,6 +248,8 @@ def batch_of(
     is_posed_box = types == {"sphere", "aabb"} and (own is not None or (is_named and second.type == "aabb"))
     if types in _BALL_AND_MESH or (is_posed_box and first.dimension == 3):
         return _ball_batch(first, second, poses, answers, own)
+    if is_posed_box and is_named:  # in the plane: what a disc meets is an edge
+        return None
     has_detail = answers.details is not None
     have_faces = first.dimension == 3 and has_faces(first) and has_faces(second)
     is_coarse = answers.boolean or (is_named and have_faces)
