@@ -324,8 +324,9 @@ def _ball_batch(
         answers.relations[start:stop] = _SWAPPED[relations] if is_swapped else relations
         if is_named:
             assert answers.witnesses is not None
-            for row in np.flatnonzero(relations > DISJOINT).tolist():
-                answer = named(mesh, *results[row].tolist())
-                answers.witnesses[start + row] = (answer.swapped() if is_swapped else answer).witness
+            rows = np.flatnonzero(relations > DISJOINT)
+            faces = np.where(relations[rows] >= OVERLAPPING, mesh.faces[triangles[rows]], -1)
+            for row, relation, face in zip(rows.tolist(), relations[rows].tolist(), faces.tolist()):
+                answers.witnesses[start + row] = named(relation, face, is_swapped).witness
 
     return fill

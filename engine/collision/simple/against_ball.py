@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from engine.bounding.bvh import STACK
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.exact_images import Vector, image_point, rounded
 from engine.collision.meshes import parity
-from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, MeshBody, in_tree, mesh_body_of, triangle_of
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, mesh_body_of, triangle_of
 from engine.collision.meshes.near_triangles import nearest_points, relative_to, rounding_bound
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
@@ -245,15 +246,17 @@ def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> C
     relation, triangle = results[0].tolist()
     if relation == UNSETTLED or (relation == OVERLAPPING and parity.state_at(mesh.arrays, triangle) == STATE_STACKED):
         return None
-    return named(mesh, relation, triangle)
+    return named(relation, int(mesh.faces[triangle]) if relation in (OVERLAPPING, TOUCHING) else -1)
 
 
-def named(mesh: MeshBody, relation: int, triangle: int) -> Collision:
-    """Return the answer, with its witness, for a relation code and a witness triangle of `relate_balls`."""
-    if relation in (OVERLAPPING, TOUCHING):
-        face = int(mesh.faces[triangle])
-        return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
-    return _WITHIN[relation]
+@lru_cache(4096)
+def named(relation: int, face: int, is_swapped: bool = False) -> Collision:
+    """Return the answer, with its witness, for a relation code of a body (first) and a ball, and a face of the body
+    that the ball touches or enters, -1 for none; is_swapped: of the ball and the body."""
+    answer = _WITHIN.get(relation)
+    if answer is None:
+        answer = Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
+    return answer.swapped() if is_swapped else answer
 
 
 _WITHIN = {DISJOINT: NO_CONTACT, FIRST_INSIDE_SECOND: FIRST_WITHIN, SECOND_INSIDE_FIRST: SECOND_WITHIN}
