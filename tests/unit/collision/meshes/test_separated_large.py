@@ -126,7 +126,8 @@ def test_fans_that_overlap_are_decided_in_time() -> None:
     first, second = fan(64_000, 1.0, 1), fan(64_000, 1.0, 2)
     for at in ([0.3, 0.1, 0.2], [0.0, 0.0, 0.3]):  # all boxes around the apexes overlap
         move = Pose(np.eye(3), at)
-        collide(fan(8), fan(8), second_pose=move)  # compiles
+        for n in (8, 40_000):  # compiles, the trees of large meshes as well
+            collide(fan(n), fan(n), second_pose=move)
         assert collide(first, second, second_pose=move, deadline=0.5).relation == Relation.OVERLAPPING
         assert collide(second, first, second_pose=move, deadline=0.5).relation == Relation.OVERLAPPING
 
