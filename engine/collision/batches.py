@@ -94,13 +94,11 @@ class PairBatches:
         an overlap that is not proven to be PO stays UNSETTLED. witnesses (n): in the plane, and of boxes and balls,
         filled too."""
         (pool, places), flag, is_named = self.pool(budget), budget.flag, witnesses is not None
-        bodies, has_forms = places[kinds], bool(self.are_boxes.any() or self.are_balls.any())
+        bodies, has_boxes, has_balls = places[kinds], bool(self.are_boxes.any()), bool(self.are_balls.any())
         rows = FormRows(self.forms(), kinds, poses.rotations, poses.translations, is_posed)
         contacts = np.full((len(pairs) if self.is_planar and is_named else 0, 3), -1, np.int32)
 
-        def relate_forms(start: int, stop: int, with_balls: bool) -> None:
-            if not has_forms:
-                return
+        def by_forms(start: int, stop: int, with_balls: bool) -> None:
             codes, some = np.empty(stop - start, np.int32), relations[start:stop]
             entry_of(relate_form_pairs)(rows, pairs[start:stop], some, is_named, with_balls, codes, flag)
             budget.check()
@@ -112,13 +110,15 @@ class PairBatches:
                 witnesses[start:stop] = map(witness_of_forms, codes.tolist())
 
         def task(start: int, stop: int) -> None:
-            relate_forms(start, stop, self.is_planar or is_named)
+            with_balls = self.is_planar or is_named
+            if has_boxes or (has_balls and with_balls):
+                by_forms(start, stop, with_balls)
             some, codes = pairs[start:stop], relations[start:stop]
             if not self.is_planar:
                 entry_of(relate_convex_pairs)(pool, bodies, poses, some, boolean, not detail, codes, flag)
                 budget.check()
-                if not is_named:  # balls that touch: others are decided sooner by floats
-                    relate_forms(start, stop, True)
+                if has_balls and not is_named:  # balls that touch: others are decided sooner by floats
+                    by_forms(start, stop, True)
                 return
             met = contacts[start:stop]
             entry_of(relate_outline_pairs)(pool, bodies, poses, some, boolean, detail, codes, met, flag)

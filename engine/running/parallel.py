@@ -189,7 +189,7 @@ def run_chunks(
     workers: threads at once; None for one per core, 1 for the calling thread only. in_order: a task continues what the
     range before began, so that ranges stay short where there are few threads. pace: seconds an item takes, where that
     is known and items are few and long: none is timed first.
-    Raises: what `task` raises (of the ranges that failed before the others were told to end, the earliest),
+    Raises: what `task` raises (of the ranges that failed before the flag was raised, the earliest),
     `DeadlineExceededError`, `CancelledError`.
     """
     check_options(workers, progress)

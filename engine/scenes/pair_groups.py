@@ -60,7 +60,7 @@ def settle_pairs(
         return
     are_few, ends = len(left) <= _FEW_IN_ALL, left
     if not are_few:
-        left, ends = grouped(left, _keys_of(bodies, pairs[left], answers))
+        left, ends = grouped(left, _keys_of(bodies, pairs[left]))
 
     def pair_of(item: int) -> PlacedPair:
         i, j = pairs[item].tolist()
@@ -76,7 +76,7 @@ def settle_pairs(
     run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
 
 
-def _keys_of(bodies: SceneBodies, pairs: IntArray, answers: Answers) -> IntArray:
+def _keys_of(bodies: SceneBodies, pairs: IntArray) -> IntArray:
     """Return a number for each pair (n, 2), equal for pairs that one kernel call may relate: of the same two solids,
     each posed in both or in neither; one of its own for a pair under equal poses, and where no kernel helps. A ball
     before a posed box has a witness on a face, which a kernel for many finds."""
@@ -85,11 +85,12 @@ def _keys_of(bodies: SceneBodies, pairs: IntArray, answers: Answers) -> IntArray
     (i, j), n, turns = pairs.T, len(bodies.distinct), bodies.rotations[1:]
     is_moved = _are_any(turns != np.eye(3)) | _are_any(bodies.translations[1:] != 0.0)
     keys: IntArray = 4 * (bodies.kinds[i] * n + bodies.kinds[j]) + 2 * is_moved[i] + is_moved[j]
-    types = np.array([solid.type for solid in bodies.distinct])[bodies.kinds]
-    is_ball, is_box = types == "sphere", types == "aabb"
+    types = np.array([solid.type for solid in bodies.distinct])
+    is_ball, is_box = (types == "sphere")[bodies.kinds], (types == "aabb")[bodies.kinds]
     is_plain = is_ball | (is_box & ~_are_any(turns != np.rint(turns)))  # decided by that, alone
-    has_faces = (is_ball[i] & is_box[j] & bodies.is_posed[j]) | (is_box[i] & bodies.is_posed[i] & is_ball[j])
-    alone = np.concatenate([of_one_pose(bodies, pairs), np.flatnonzero(is_plain[i] & is_plain[j] & ~has_faces)])
+    is_posed_box = is_box & bodies.is_posed
+    meets_face = (is_ball[i] & is_posed_box[j]) | (is_posed_box[i] & is_ball[j])
+    alone = np.concatenate([of_one_pose(bodies, pairs), np.flatnonzero(is_plain[i] & is_plain[j] & ~meets_face)])
     keys[alone] = 4 * n * n + alone
     return keys
 

@@ -194,17 +194,17 @@ def test_scenes_of_boxes_and_balls_are_answered_as_pair_by_pair(d: int, seed: in
 @pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 0), (0, 0), (1, 1)])
 @pytest.mark.parametrize("d", [2, 3])
 def test_witnesses_do_not_change_the_detail_of_many_poses(d: int, first: int, second: int) -> None:
-    """A ball within a box was told to overlap it partly where witnesses were asked for as well."""
+    """A ball within a box was answered as partly overlapping where witnesses were asked for as well."""
     draw = np.random.default_rng(5)
     solids: list[Solid] = [Aabb([-0.5] * d, [1.0] * (d - 1) + [1.5]), Sphere([0.5] + [0.0] * (d - 1), 0.5)]
     turns = np.broadcast_to(np.eye(d), (200, d, d))
     moves = draw.integers(-4, 5, (200, d)) / 4
     codes, _, details = collide_poses(solids[first], solids[second], turns, moves, witnesses=True, detail=True)
-    told = [
+    singles = [
         collide(solids[first], solids[second], second_pose=Pose(turns[k], moves[k]), detail=True) for k in range(200)
     ]
-    assert codes.tolist() == [answer.relation for answer in told]
-    assert details.tolist() == [answer.detail for answer in told]
+    assert codes.tolist() == [answer.relation for answer in singles]
+    assert details.tolist() == [answer.detail for answer in singles]
     assert len(set(details.tolist())) >= 2
 
 
